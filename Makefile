@@ -120,9 +120,6 @@ campaign-rigs: setup ## Laboratory rigs with something hidden: RIGS cases of a f
 campaign-values: setup ## One value or two wrong in model files without tolerances: are these named, and no others?
 	$(Q)$(PYTHON) test/diagnosis/values_cases/values_campaign.py --cases 100 --jobs $$(nproc)
 
-searches: setup build/setup/mujoco ## Each search of the diagnosis alone, and both, on the same cases of all generators; test/diagnosis/SEARCHES.md
-	$(Q)$(PYTHON) test/diagnosis/ablation/searches.py --cases 40 --worlds 20 --mechanisms 5 --mujoco 20 --jobs $$(nproc) --page test/diagnosis/SEARCHES.md
-
 ablate: setup ## Which thresholds of the diagnosis decide something, and which go, with every one of them watched: build/ablate/ABLATION.md; hours
 	$(Q)rm -rf build/ablate/notes
 	$(Q)PROBES=build/ablate/notes $(PYTHON) test/diagnosis/campaign.py --seed 20261126 --cases 300 --jobs $$(nproc) --command "$(WATCHED) diagnose" --out build/ablate/draw
@@ -144,7 +141,7 @@ structure: setup ## Take over counts of long files, long functions, circular imp
 clean: ## Remove all that was built (the set-up too)
 	rm -rf build
 
-.PHONY: help setup run watch pythons test nightly prove figures bench bench-filters train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-rigs campaign-values searches campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
+.PHONY: help setup run watch pythons test nightly prove figures bench bench-filters train campaign campaign-diagnosis campaign-worlds campaign-mujoco campaign-rigs campaign-values campaign-train onnx-table ablate rigs hidden-mechanisms dist site structure clean
 
 build/setup/tools: test/setup.sh
 build/setup/python: requirements.txt pyproject.toml build/setup/tools

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 import penode_gen
 from penode_gen.model import GROUND, Model
 from penode_sil.diagnosis import catalogue
-from penode_sil.diagnosis.catalogue import actuators, channels, drives, form, others
+from penode_sil.diagnosis.catalogue import actuators, channels, drives, form, networks, others
 from penode_sil.diagnosis.plant import Place, places
 from penode_sil.diagnosis.result import plain
 
@@ -102,6 +102,9 @@ def known() -> dict[str, Known]:
         for index, place in enumerate(places(model)):
             for one in file.forms(model, index, place, motion):
                 found[one.kind].add(said(place), file.sizes(one, sizes))
+    trained = replace(places(model)[0], trained=(("network", "s", -0.005, 0.005, True),))
+    for one in networks.forms(model, 0, trained, motion):
+        found[one.kind].add("an element with a network", networks.sizes(one, sizes))
     for one in (*drives.inputs(model, 1), *drives.bent(model, 1, actuators.Drive([s], t[1], t[10], 0.16))):
         found[one.kind].add("an input", drives.sizes(one, sizes, OWN_UNIT))
     for one in drives.sensors(model, 1):

@@ -74,7 +74,7 @@ def score(model: Model, case: Case) -> Score:
         return null(model, case)
     good = np.ones_like(case.y, dtype=bool)
     e = noise.prepare("case", case.time, case.u, case.y, good, np.zeros(case.u.shape[1]), [None] * case.y.shape[1])
-    state = study.begin(model, [e])[0]
+    state = study.begin(model, [e])
     unseen = expected(model) - {frozenset(p.ends) for p in state.places}
     found = missing_forces(state)
     rank = next((k for k, m in enumerate(found) if set(m.place.ends) == set(WHERE[case.plant, case.kind])), -1)

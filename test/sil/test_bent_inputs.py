@@ -153,7 +153,7 @@ def rubbed(level, transition):
 
 
 FRICTIONS = [
-    (SLIDE, lambda x, v: plain(x, v) + (4.0 + 120.0 * x) * rubbed(1.0, 0.004)(v), 2.0, 15.0, "xa", "position_dependent_friction", "spring"),
+    (SLIDE, lambda x, v: plain(x, v) + (4.0 + 120.0 * x) * rubbed(1.0, 0.004)(v), 2.0, 15.0, "xa", "position_dependent_friction", "guide"),
     (
         LINK,
         lambda x, v: 6.0 * math.sin(x) + 0.15 * v + (0.1 + 0.2 * abs(6.0 * math.sin(x))) * rubbed(1.0, 0.02)(v),
@@ -161,7 +161,7 @@ FRICTIONS = [
         3.0,
         "xw",
         "load_dependent_friction",
-        "gravity",
+        "bearing",
     ),
 ]
 

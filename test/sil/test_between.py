@@ -123,8 +123,10 @@ def test_a_limit_that_nothing_reaches_is_none(tmp_path):
     """And one that is reached cuts off just that."""
     model, (e,) = swing(tmp_path, lambda s, v: 0.0, seconds=2.0)
     top = float(np.max(np.abs(e.y)))
-    limited, free = clipping.limited(model, Form(clipping.KIND, "phi", "clip", 0, limit=0.5 * top), "most")
-    whole, open_, cut = (Batch(m).run(e.u, parameters=p).z[0] for m, p in ((model, {}), (limited, {}), (limited, {"most": free.value})))
+    limited, (free,) = clipping.limited(model, Form(clipping.KIND, "phi", "clip", 0, limit=0.5 * top), "most")
+    whole, open_, cut = (
+        Batch(m).run(e.u, parameters=p).z[0] for m, p in ((model, {}), (limited, {}), (limited, {free.target: free.value}))
+    )
     assert np.array_equal(whole, open_)
     assert np.array_equal(np.clip(whole, -0.5 * top, 0.5 * top), cut) and np.any(cut != whole)
 
@@ -190,8 +192,8 @@ def test_two_sensors_have_a_limit_each(tmp_path):
     names = []
     for number, index in enumerate((0, 1)):
         form = Form(clipping.KIND, both.sensors[index].name, "clip", index, limit=0.1 * (index + 1))
-        both, free = clipping.limited(both, form, f"x{90 + number}_0_limit")
-        names.append(free.target)
+        both, free = clipping.limited(both, form, f"x{90 + number}_0")
+        names += [f.target for f in free]
     assert names == ["x90_0_limit", "x91_0_limit"] and [s.expression.count("limit") for s in both.sensors] == [2, 2]
 
 

@@ -20,34 +20,13 @@ from scipy.signal import lfilter, lsim
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import (
-    build,
-    dropouts,
-    echo,
-    effects,
-    explaining,
-    explanation,
-    extension,
-    hypotheses,
-    measuring,
-    noise,
-    plant,
-    pursuit,
-    refining,
-    score,
-    sized,
-    steady,
-    study,
-    textbook,
-)
-from penode_sil.diagnosis.build import Term
+from penode_sil.diagnosis import dropouts, late, measuring, noise, plant, study
+from penode_sil.diagnosis.catalogue import memory
 from penode_sil.diagnosis.compiling import longest
 from penode_sil.diagnosis.driven import experiment
-from penode_sil.diagnosis.faulty import delayed, railed
-from penode_sil.diagnosis.fit import Problem
-from penode_sil.diagnosis.late import fastest, poles
+from penode_sil.diagnosis.fit import Fit, Free, Problem
+from penode_sil.diagnosis.leftover import only_noise
 from penode_sil.recordings.measured import load
-from penode_sil.targets import Sil
 
 M_B, M_W, C, D, C_T = 400.0, 45.0, 22e3, 1500.0, 210e3
 STEP, SAMPLES = 2e-3, 5000
@@ -113,12 +92,6 @@ def record(path: Path, z: np.ndarray, sensors: dict[str, np.ndarray], seed: int,
     header = ["time [s]", "z_road [m]", *(f"{k} [{'m/s^2' if k.startswith('a_') else 'm'}]" for k in noise)]
     np.savetxt(path, np.stack(columns, axis=1), delimiter=",", header=",".join(header), comments="", fmt="%.9g")
     return path
-
-
-def studied(path: Path, model: penode_gen.Model) -> study.Study:
-    """What a search for causes begins with."""
-    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
-    return replace(one, nothing=study.loss(one, one.null), seen=study.look(one, one.null))
 
 
 def moved(tmp_path: Path, z: np.ndarray, force: np.ndarray) -> tuple[penode_gen.Model, Path]:
@@ -195,7 +168,7 @@ def test_a_fit_ends_at_its_bounds(model, sound):
     problem = Problem(model, one.experiments, one.metrics, fastest=one.linear.fastest)
     low = 1.004 * one.null.value("d")
     bound, held = (
-        [replace(f, **change) if f.target == "d" else f for f in one.nuisances] for change in ({"low": low}, {"low": low, "high": low})
+        [replace(f, **change) if f.target == "d" else f for f in one.null.free] for change in ({"low": low}, {"low": low, "high": low})
     )
     bound, held = (
         problem.solve([replace(f, value=float(np.clip(f.value, f.low, f.high))) for f in free], 20, 1e-4) for free in (bound, held)
@@ -223,11 +196,26 @@ def test_a_fit_ends_with_derivatives_of_its_end(model, sound):
     """However it got there: from afar they are those of simulation, not what has become of the first ones."""
     one = study.null_study(model, [experiment(m, model) for m in sound])
     problem = Problem(model, one.experiments, one.metrics, fastest=one.linear.fastest)
-    afar = [replace(f, value=1.1 * f.value) if f.target in ("c", "d") else f for f in one.nuisances]
+    afar = [replace(f, value=1.1 * f.value) if f.target in ("c", "d") else f for f in one.null.free]
     for iterations in (1, 2, 3, 4, 5, 20):
         fit = problem.solve(afar, iterations, 1e-4)
         assert np.array_equal(fit.jacobian, problem.linear(fit.free)[1])
     assert abs(fit.cost - one.null.cost) < 1e-2
+
+
+@pytest.mark.parametrize("chi2, so", [(10_400.0, True), (10_500.0, False)])
+def test_noise_alone_has_a_chi2_of_its_own(chi2, so):
+    """10 000 samples: 10 000 +- 141."""
+    study = SimpleNamespace(null=SimpleNamespace(residual=np.zeros(10_000)), experiments=[SimpleNamespace(good=np.ones(10_000, bool))])
+    assert only_noise(study, SimpleNamespace(chi2=chi2)) == so
+
+
+def test_a_time_constant_that_nothing_shows_leaves_a_size_as_sure_as_it_is():
+    """A loss of 0.5 +- 0.01 and a time along which it changes by 1e-8 a factor of e: it is off by 1e20 at most, not by exp(5e7)."""
+    free = (Free("loss", 0.5, 0.01), Free("cooling", 1e8, 1.0, log=True))
+    fit = Fit(None, free, 0.0, 0.0, np.zeros(2), np.diag([1.0, 1e-9]), ())
+    along = np.array([0.01, 1e-8])
+    assert np.sqrt(along @ fit.covariance() @ along) == pytest.approx(0.01, rel=1e-6)
 
 
 def test_bursts_are_of_samples_that_count():
@@ -278,7 +266,7 @@ def test_a_short_step_is_found_where_all_longer_ones_fail(model, sound, monkeypa
     """Dampings far from that of the step before are tried where none near it gains."""
     one = study.null_study(model, [experiment(m, model) for m in sound])
     problem = Problem(model, one.experiments, one.metrics)
-    afar = [replace(f, value=1.1 * f.value) if f.target == "d" else f for f in one.nuisances]
+    afar = [replace(f, value=1.1 * f.value) if f.target == "d" else f for f in one.null.free]
     wild, sensors = next(i for i, f in enumerate(afar) if f.target == "d"), problem.sensors
     steps = np.abs(problem.at(tuple(afar)).steps()[0][:, wild])
     assert steps[-1] < 0.5 * steps[-2]
@@ -290,43 +278,6 @@ def test_a_short_step_is_found_where_all_longer_ones_fail(model, sound, monkeypa
     before = problem.at(tuple(afar)).cost
     monkeypatch.setattr(problem, "sensors", bounded)
     assert problem.solve(afar, 1).cost < before - 1.0
-
-
-def test_what_ends_without_force_is_no_cause(tmp_path, model):
-    """Friction and a spring that gets softer hide; a fit that begins with friction and a stop ends with the friction alone."""
-    z = road(5)
-    path = record(tmp_path / "rubs.csv", z, drive(z, lambda s, v: 60.0 * math.tanh(v / 4e-3) - 2e7 * s**3), 15)
-    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
-    r = study.regression(one, one.null, [])
-    first = {c.kind: c for c in r.candidates[::-1]}
-    terms = [Term(first["coulomb_friction"], 40.0), Term(first["bump_stop"], 1000.0)]
-    found = explaining.explain(one, terms)
-    assert [t.candidate.what.place for t in found.terms] == [terms[0].candidate.what.place] and found.groups[0][0] != "bump_stop"
-    assert len(found.built.names) == 1 and not any("gap" in name for name in found.fit.model.parameters)
-
-
-def test_a_fit_goes_on_with_the_derivatives_of_the_fit_that_it_starts_from(tmp_path, model, monkeypatch):
-    """Where all of them are as they are there, and white by the same noise; else with those of the null fit."""
-    z = road(5)
-    path = record(tmp_path / "rubs.csv", z, drive(z, lambda s, v: 60.0 * math.tanh(v / 4e-3)), 15)
-    one = studied(path, model)
-    rubs = next(c for c in study.regression(one, one.null, []).candidates if c.kind == "coulomb_friction")
-    first = explaining.explain(one, [Term(rubs, 40.0)])
-    whole = first.whole().fit
-    other = replace(whole, metrics=list(whole.metrics))
-    d = next(i for i, f in enumerate(one.null.free) if f.target == "d")
-    assert np.linalg.norm(whole.jacobian[:, d] - one.null.jacobian[:, d]) > 1e-3 * np.linalg.norm(one.null.jacobian[:, d])
-    taken, solve = [], Problem.solve
-
-    def spied(self, free, iterations, close, known):
-        taken.append(known)
-        return solve(self, free, iterations, close, known)
-
-    monkeypatch.setattr(Problem, "solve", spied)
-    for start, expected in ((whole, whole), (None, one.null), (replace(whole, whole=False), one.null), (other, one.null)):
-        taken.clear()
-        explaining.explain(one, first.terms, 1, start)
-        assert taken and all(np.array_equal(known[d], expected.jacobian[:, d]) for known in taken)
 
 
 def test_transfer_of_a_place_is_that_of_the_equations(model):
@@ -341,79 +292,6 @@ def test_transfer_of_a_place_is_that_of_the_equations(model):
         z = np.linalg.solve(a, [-1.0, 1.0])
         want = np.array([-(w**2) * z[0], -(w**2) * z[1], z[0] - z[1]])
         assert np.allclose(row, want, rtol=1e-6)
-
-
-def test_column_of_a_law_is_what_simulation_gives(model, sound):
-    """A bump stop of 1 N/m in the regression against the difference of two simulations of the plant."""
-    base, _ = study.begin(model, [experiment(m, model) for m in sound])
-    seen = study.look(base, base.null)
-    z = road(1)
-    gap = 0.4 * float(np.max(seen[0].motions[0].s))
-    small = 50.0
-    with_stop, without = drive(z, lambda s, v: small * max(s - gap, 0.0)), drive(z, lambda s, v: 0.0)
-    want = np.stack([(with_stop[k] - without[k]) / small for k in NOISE], axis=1)
-    phi = np.fft.rfft(np.maximum(seen[0].motions[0].s - gap, 0.0))[: base.experiments[0].band]
-    got = base.metrics[0].white(seen[0].answer(phi[None], 0))[0]
-    white = base.metrics[0](want)
-    # parameters within tolerance move the motion by about 1 %, and so the force beyond the gap
-    assert np.linalg.norm(got - white) < 0.05 * np.linalg.norm(white)
-
-
-def test_some_kinds_have_the_rows_that_they_have_among_all(tmp_path, model):
-    """Of whole recordings and of such with holes, few and many, which are whitened in other ways."""
-    z = road(1)
-    measured = load([record(tmp_path / "sound.csv", z, drive(z, lambda s, v: 0.0), 2)], model)
-    whole = experiment(measured[0], model)
-    for holes in (0, 20, 900):
-        good = np.ones_like(whole.good)
-        good[100 : 100 + holes, 2] = False
-        base, _ = study.begin(model, [replace(whole, good=good)])
-        seen = study.look(base, base.null)
-        parts = model, base.experiments, base.metrics, seen, base.places, list(NOISE), 0
-        (every, rows), (some, own_rows) = (effects.collect(*parts, kinds) for kinds in ((), {"bump_stop", "sensor_scale"}))
-        own = [i for i, c in enumerate(every) if c.kind in ("bump_stop", "sensor_scale")]
-        assert [(c.kind, c.where) for c in some] == [(every[i].kind, every[i].where) for i in own]
-        assert np.array_equal(own_rows, rows[own])
-        stop = next(c for c in some if c.kind == "bump_stop")
-        force = np.fft.rfft(stop.what.series[0])[None, : base.experiments[0].band]
-        effect = np.fft.irfft(seen[0].answer(force, stop.what.place)[0], SAMPLES, axis=0) * good
-        row = own_rows[some.index(stop)]
-        # roundings of single precision, 6e-8, in each of the twelve stages of a transform, if all add up: 7e-7
-        assert np.linalg.norm(row - base.metrics[0](effect)) < 1e-6 * np.linalg.norm(row)
-
-
-def test_effects_are_weighed_as_least_squares_do(tmp_path, model):
-    """Slopes, correlations and what is left, against a solution in double by NumPy with free values and their priors as further
-    columns and rows; and again with fewer of them free, against another residual."""
-    z = road(1)
-    one, _ = study.begin(
-        model,
-        [experiment(m, model) for m in load([record(tmp_path / "r.csv", z, drive(z, lambda s, v: 9e3 * max(s - 0.006, 0.0)), 2)], model)],
-    )
-    candidates, rows = effects.collect(model, one.experiments, one.metrics, study.look(one, one.null), one.places, list(NOISE), 1)
-    rows[5] *= 1e-25  # of which the square is none in single
-    double = rows.astype(float)
-    fit = one.null
-    index = {f.target: i for i, f in enumerate(fit.free)}
-    double[-1] = fit.jacobian[:, index["c"]]
-    r = score.Regression(fit, candidates, rows, ["c"])
-    fewer = [i for i, f in enumerate(fit.free) if f.target not in ("d", ("skew", 1))]
-    moved = fit.residual + 2.0 * fit.jacobian[:, index["d"]]
-    other = replace(fit, free=tuple(fit.free[i] for i in fewer), residual=moved, jacobian=fit.jacobian[:, fewer])
-    for got, now in ((r, fit), (r.without(other), other)):
-        free = [(f, now.jacobian[:, i]) for i, f in enumerate(now.free) if f.low < f.value < f.high]
-        wide = np.concatenate([np.stack([j for _, j in free], axis=1), np.diag([f.unit / f.sigma for f, _ in free])])
-        padded = np.concatenate([double, np.zeros((len(double), len(free)))], axis=1).T
-        residual = np.concatenate([now.residual, [-f.offset for f, _ in free]])
-        left = padded - wide @ np.linalg.lstsq(wide, padded, rcond=None)[0]
-        rest = residual - wide @ np.linalg.lstsq(wide, residual, rcond=None)[0]
-        size = np.linalg.norm(left, axis=0)
-        alive = size > 1e-4 * np.linalg.norm(padded, axis=0)  # singles are rounded by 6e-8: of 1e-4 that is a thousandth
-        assert alive[[5, -1]].all() and np.all(got.alive[alive])
-        assert np.allclose(got.scale[alive], size[alive], rtol=1e-3)
-        assert got.chi2 == pytest.approx(float(rest @ rest), rel=1e-9)
-        assert np.max(np.abs(got.slope - left.T @ rest / size)[alive]) < 1e-3 * np.linalg.norm(rest)
-        assert np.max(np.abs(got.gram - left.T @ left / np.outer(size, size))[np.ix_(alive, alive)]) < 1e-3
 
 
 def test_simulation_of_the_fit_is_exact(model):
@@ -495,137 +373,6 @@ def test_every_second_of_close_samples_gives_the_same(tmp_path, tyre):
     assert longest(short) < 1e-3
 
 
-@pytest.mark.parametrize(
-    "friction, whole",
-    [("", True), ('rubs = { between = ["body", "wheel"], law = "dahl_friction", force = "40 N", presliding = "1 mm" }', False)],
-)
-def test_fits_begin_with_longer_steps_than_laws_allow(tmp_path, friction, whole):
-    """Friction that yields over a millimetre moves on by 0.3 of that in a step of 1 ms at 0.3 m/s, and is followed in steps of 0.25 ms: a
-    quarter of the work leads to where at most chi2 of the numbers that are fitted is left to gain."""
-    (tmp_path / "car.toml").write_text(MODEL.replace('"2 ms"', '"0.5 ms"').replace("[outputs]", f"{friction}\n[outputs]"))
-    model = penode_gen.load(tmp_path / "car.toml")
-    n, rng = 12000, np.random.default_rng(3)
-    t = 5e-4 * np.arange(n)
-    z = sum(0.02 / f * np.sin(2.0 * np.pi * f * t + f) for f in (0.7, 2.3, 6.1, 12.9)) * np.minimum(t / 0.5, 1.0) ** 2
-    raw = noise.prepare("", t, z[:, None], np.zeros((n, 3)), np.ones((n, 3), bool), np.zeros(1), [None] * 3)
-    clean = Problem(model, [raw], []).simulate(0, (), np.zeros((1, 0)))[0][0]
-    e = replace(raw, y=clean + rng.standard_normal(clean.shape) * [NOISE[s.name] for s in model.sensors])
-    levels = np.tile(np.square([NOISE[s.name] for s in model.sensors]), (e.band, 1))
-    problem = Problem(model, [e], [noise.metric(e, levels, np.zeros((e.band, 3, 1)))])
-    if whole:
-        assert problem.rough is None and problem.halved is not None
-        return
-    assert problem.halved is None and 4 * problem.rough.steps == problem.steps
-    free = [replace(f, value=1.02 * f.value) for f in study.nuisances(model, [e]) if isinstance(f.target, str)]
-    best = problem.solve(free)
-    assert problem.at(problem.rough.solve(free).free).cost < best.cost + len(free)
-
-
-def test_laws_that_do_the_same_are_one(tmp_path, model):
-    """Two stops fitted to the recording of one share it in any way; the one that is left knows its gap."""
-    z = road(5)
-    path = record(tmp_path / "stop.csv", z, drive(z, lambda s, v: 10e3 * max(s - 0.006, 0.0)), 15)
-    one = studied(path, model)
-    r = study.regression(one, one.null, [])
-    stops = [c for c in r.candidates if c.kind == "bump_stop" and c.what.law == "bump_stop"]
-    stops.sort(key=lambda c: abs(c.what.shapes["gap"][0] - 0.006))
-    both = explaining.explain(one, [Term(c, 5e3) for c in stops[:2]])
-    alone = textbook.leaner(one, both, lambda text: None)
-    assert len(both.terms) == 2 and len(alone.terms) == 1 and alone.score > both.score
-    gap = sized.values(one, alone, alone.groups[0])["gap"]
-    assert gap.value == pytest.approx(0.006, rel=0.02) and gap.ci95[0] < 0.006 < gap.ci95[1] < 0.0062
-
-
-def test_a_curve_has_the_parameter_of_its_element_in_it(tmp_path, model):
-    """A damper that is 10 % stronger at low rates and 10 % weaker beyond 0.1 m/s is one curve; told as a wrong damping with a degressive
-    damper beside it, it is that curve, with the same slopes."""
-    z = road(5)
-    path = record(tmp_path / "knee.csv", z, drive(z, lambda s, v: 0.1 * D * v - 0.2 * D * (v - min(max(v, -0.1), 0.1))), 15)
-    one = studied(path, model)
-    r = study.regression(one, one.null, ["d"])
-    kinks = [c for c in r.candidates if c.kind == "degressive_damper" and "min(v + knee" in c.what.law]
-    kink = min(kinks, key=lambda c: abs(c.what.shapes["knee"][0] - 0.1))
-    wrong = next(c for c in r.candidates if c.kind == "wrong_parameter" and c.where == "d")
-    two = explaining.explain(one, [Term(kink, 0.1 * D), Term(wrong, 0.0)])
-    curve = textbook.joined(one, two, lambda text: None)
-    assert len(two.groups) == 2 and curve.groups == (("degressive_damper", "damper"),) and curve.gain > two.gain - 10.0
-    low, high = (sized.values(one, curve, curve.groups[0])[f"{rate}_rate_damping"] for rate in ("low", "high"))
-    assert low.value == pytest.approx(1.1 * D, rel=0.01) and high.value == pytest.approx(0.9 * D, rel=0.02)
-    assert textbook.unbent(one, curve, lambda text: None) is curve  # its straight part is no reason to call it straight
-
-
-def test_a_bushing_without_memory_is_a_spring(tmp_path, model):
-    """A hardening spring, told as a bushing that hardens and forgets within 1000 s."""
-    z = road(5)
-    path = record(tmp_path / "cubic.csv", z, drive(z, lambda s, v: 2e7 * s**3), 15)
-    one = studied(path, model)
-    laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == "hardening_bushing"]
-    slow = replace(laws[0].what, shapes={"relaxation": (1000.0, "s")})
-    bushing = explaining.explain(one, [Term(replace(laws[0], companion=False, what=slow), 2e7)])
-    spring = textbook.unlagged(one, bushing, lambda text: None)
-    assert bushing.groups == (("maxwell_bushing", "spring"),) and spring.groups == (("cubic_spring", "spring"),)
-    assert spring.terms[0].gain == pytest.approx(2e7, rel=0.02)
-
-
-def test_a_bushing_that_hardens_is_refined_by_one(tmp_path, model):
-    """A spring behind a dashpot that is half as stiff again at 5 mm, with what it holds as a state. Another cause would else come in for
-    that."""
-    z, relaxation = road(5), 0.08
-    height = curve(z, STEP)
-
-    def rates(time: float, x: list[float]) -> list[float]:
-        s, v, held = x[0] - x[1], x[2] - x[3], x[4]
-        pull = C * s + D * v + 4e3 * held * (1.0 + 0.5 * (held / 5e-3) ** 2)
-        return [x[2], x[3], -pull / M_B, (pull - C_T * (x[1] - height(time))) / M_W, v - held / relaxation]
-
-    x, dx = integrate(rates, [0.0] * 5, STEP, SAMPLES)
-    path = record(tmp_path / "hardens.csv", z, {"a_body": dx[2], "a_wheel": dx[3], "deflection": x[0] - x[1]}, 15)
-    one = studied(path, model)
-    r = study.regression(one, one.null, [])
-    kind = ("maxwell_bushing", "spring")
-    _, chosen = pursuit.pursue(r, [k for k in pursuit.pools(r)[kind] if explanation.law_of(r.candidates[k]) == "maxwell_bushing"], terms=1)
-    linear = explaining.explain(one, pursuit.terms_of(r, chosen)).whole()
-    wider, _ = refining.refine(one, linear, study.regression(one, linear.fit, []), [])
-    assert wider.groups == linear.groups == (kind,)
-    assert "hardening_bushing" in {explanation.law_of(t.candidate) for t in wider.terms}
-    assert wider.score > linear.score + explanation.NEW
-
-
-def test_friction_that_falls_for_nothing_is_coulomb(tmp_path, model):
-    """Friction that is constant, told as one that falls by a third: without the fall it does as well, and costs less."""
-    z = road(5)
-    path = record(tmp_path / "rubs.csv", z, drive(z, lambda s, v: 60.0 * v / math.hypot(v, 4e-3)), 15)
-    one = studied(path, model)
-    laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == hypotheses.STRIBECK]
-    falling = explaining.explain(one, [Term(laws[-1], 40.0)], iterations=0)
-    constant = textbook.plain(one, falling, [], lambda text: None)
-    assert falling.groups == (("stribeck_friction", "damper"),) and constant.groups == (("coulomb_friction", "damper"),)
-    force = sized.values(one, constant, constant.groups[0])["force"]
-    assert force.value == pytest.approx(60.0, rel=0.02)
-
-
-def test_friction_that_yields_a_little_is_coulomb(tmp_path, model):
-    """A force that slides after 50 um, told as one that falls as the rate grows; with the slip as a state, which moves by 1.3 of itself in
-    a step at 0.5 m/s."""
-    z = road(5)
-    height = curve(z, STEP)
-
-    def rates(time: float, x: list[float]) -> list[float]:
-        s, v, slip = x[0] - x[1], x[2] - x[3], x[4]
-        pull = C * s + D * v + 30.0 * slip
-        return [x[2], x[3], -pull / M_B, (pull - C_T * (x[1] - height(time))) / M_W, (v - abs(v) * slip) / 5e-5]
-
-    x, dx = integrate(rates, [0.0] * 5, STEP, SAMPLES, 16)
-    path = record(tmp_path / "yields.csv", z, {"a_body": dx[2], "a_wheel": dx[3], "deflection": x[0] - x[1]}, 15)
-    one = studied(path, model)
-    laws = [c for c in study.regression(one, one.null, []).candidates if getattr(c.what, "law", "") == "falling_friction"]
-    what = replace(laws[0].what, shapes={"presliding": (6e-5, "m"), "stribeck": (0.05, "m/s")})
-    falling = explaining.explain(one, [Term(replace(laws[0], what=what), 30.0)], iterations=0)
-    level = textbook.level_friction(one, falling, lambda text: None)
-    assert falling.groups == (("stribeck_friction", "damper"),) and level.groups == (("coulomb_friction", "damper"),)
-    assert sized.values(one, level, level.groups[0])["force"].value == pytest.approx(30.0, rel=0.02)
-
-
 def test_a_loss_is_that_at_the_end_of_the_recording(tmp_path):
     """A damper that loses 20 % in proportion to its work under a sweep that gets faster; of 22 999 samples the diagnosis takes 22 500,
     until when it loses 19 %."""
@@ -704,7 +451,7 @@ def test_a_mount_in_series_takes_all_of_the_damper(tmp_path):
 
 
 def test_hysteresis_under_prescribed_motion():
-    """slips() against the law integrated by SciPy; four RK4 steps a sample of 1/50 presliding leave (1/200)^4."""
+    """The force of a law along a motion against the law integrated by SciPy; four RK4 steps a sample of 1/50 presliding leave (1/200)^4."""
     t = np.linspace(0.0, 1.0, 2001)
     s = 0.01 * np.sin(2.0 * np.pi * 3.0 * t)
     want = solve_ivp(
@@ -718,7 +465,7 @@ def test_hysteresis_under_prescribed_motion():
         atol=1e-10,
         max_step=1e-3,
     ).y[0]
-    assert np.max(np.abs(hypotheses.slips(s, [4e-3])[0] - want)) < 1e-3
+    assert np.max(np.abs(memory.force("bouc_wen", {"force": 1.0, "presliding": 4e-3}, s, float(t[1])) - want)) < 1e-3
 
 
 CAUSES = {
@@ -755,11 +502,14 @@ def test_hidden_cause(tmp_path, model, case, show):
 
 
 def test_a_play_off_the_middle_has_two_halves(tmp_path, model):
-    """3 mm to one side and 1 mm to the other, of all of the spring: the gap is both together, and the law predicts."""
+    """3 mm to one side and 1 mm to the other, of all of the spring: the gap is both together, and the law predicts. A play of 2 mm to
+    either side and an offset of 1 mm of the sensor predict as well, to 0.1 nats of 2795: one cause is named, the offset is its
+    alternative."""
     paths = [record(tmp_path / f"{n}.csv", road(n), drive(road(n), lambda s, v: -C * min(max(s, -1e-3), 3e-3)), n + 10) for n in (5, 6)]
     found = diagnosis.diagnose(model, load(paths[:1], model), load(paths[1:], model), tmp_path / "out")
     (cause,) = found.causes
     gap = cause.parameters["gap"]
+    assert [(a.kind, a.where) for a in cause.alternatives] == [("sensor_bias", "deflection")]
     assert cause.kind == "backlash" and gap.value == pytest.approx(4e-3, rel=0.02) and gap.ci95[1] - gap.ci95[0] < 0.05 * gap.value
     halves = penode_gen.load(tmp_path / "out" / "model_extended.toml").elements[-2:]
     assert all(e.law == "expression" and e.expression.startswith("c*") for e in halves)
@@ -767,32 +517,10 @@ def test_a_play_off_the_middle_has_two_halves(tmp_path, model):
         assert gain.after_rmse < 1.05 * NOISE[name], name
 
 
-def test_what_is_predicted_is_as_good_as_the_true_law(tmp_path, model):
-    """A damping force that grows like no law on the list, large against the noise: its name needs fewer laws than its
-    curve. Measure is the same C with the law that the plant has. The laws that name it leave 14 % more than that in a_wheel: 8 % are
-    about half."""
-    paths = [
-        record(tmp_path / f"{seed}.csv", road(seed), drive(road(seed), lambda s, v: 4000.0 * v * abs(v) / (0.1 + abs(v))), seed)
-        for seed in (5, 6)
-    ]
-    train, held = load(paths[:1], model), load(paths[1:], model)
-    found = diagnosis.diagnose(model, train, held, tmp_path / "out")
-    assert [(c.kind, c.where) for c in found.causes] == [("quadratic_damper", "damper")]
-    law = 'more = { between = ["body", "wheel"], law = "expression", force = "strong*v_more*abs(v_more)/(fast + abs(v_more))" }'
-    sizes = 'strong = { value = 4000, unit = "N*s/m" }\nfast = { value = 0.1, unit = "m/s" }'
-    (tmp_path / "true.toml").write_text(
-        MODEL.replace("[inputs]", f"{sizes}\n[inputs]")
-        .replace("[outputs]", f"{law}\n[outputs]")
-        .replace("[parameters]", 'input = "parabola"\n[parameters]')
-    )
-    true = Sil(penode_gen.load(tmp_path / "true.toml")).instance().run(road(6)[:, None]).z
-    for (name, gain), said in zip(found.gain.items(), true.T, strict=True):
-        assert gain.after_rmse < 1.08 * np.sqrt(np.mean((held[0].z[name] - said) ** 2)), name
-
-
 def test_a_sensor_that_lags_more_than_the_signal_is_late(tmp_path):
-    """A pole of 20 ms at the force of spring and damper. A mount of the damper explains as much if the damper is weaker than it was; as a
-    dead time, from which no small step leads to a pole, the sensor explains less. A late input does the same as the late sensor."""
+    """A pole of 20 ms at the force of spring and damper does exactly what the same pole at the only input does: that is named, and the late
+    sensor is its alternative. A mount of the damper explains 14 nats of 1473 less, for its damper has to be weaker than the file says; as a
+    dead time, from which no small step leads to a pole, the sensor explains less."""
     z, rate = road(5), CubicSpline(np.arange(SAMPLES) * STEP, road(5))(np.arange(SAMPLES) * STEP, 1)
     late = lfilter([1.0, 1.0], np.array([1.0, 1.0]) + 2.0 * 0.02 / STEP * np.array([1.0, -1.0]), C * z + D * rate)
     model, path = moved(tmp_path, z, late + 2.0 * np.random.default_rng(6).standard_normal(SAMPLES))
@@ -801,35 +529,9 @@ def test_a_sensor_that_lags_more_than_the_signal_is_late(tmp_path):
     model.path.write_text(text.replace("[elements]", spring).replace('value = "F_damper"', 'value = "F_damper + F_spring"'))
     model = penode_gen.load(model.path)
     found = diagnosis.diagnose(model, load([path], model))
-    assert [(c.kind, c.where) for c in found.causes] == [("sensor_delay", "force")]
-    assert [(a.kind, a.where) for a in found.causes[0].alternatives] == [("input_delay", "z_road"), ("maxwell_bushing", "spring")]
-    assert found.causes[0].parameters["delay"].value == pytest.approx(0.02, rel=0.02)
-
-
-@pytest.mark.parametrize("lag", [0.25, 0.0, -0.25])
-def test_what_follows_late_is_an_echo(model, sound, lag):
-    """A force on the wheel like its own acceleration of another time: a rear axle meets the road after the front axle, never before."""
-    one = study.null_study(model, [experiment(m, model) for m in sound])
-    (e,) = one.experiments
-    wheel = next(k for k, p in enumerate(one.places) if p.role == "body" and "wheel" in p.ends)
-    f, n_z = e.frequencies, len(model.sensors)
-    response = one.linear.transfer(f)[:, :n_z, one.linear.n_inputs + wheel]
-    own = np.fft.rfft(e.y[:, [s.name for s in model.sensors].index("a_wheel")])
-    push = np.fft.irfft(0.02 * M_W * (own * np.exp(-2j * np.pi * f * lag))[:, None] * response, len(e.time), axis=0)
-    other = study.null_study(model, [replace(e, y=e.y + push)])
-    assert not echo.echo(one, one.null).detected and echo.echo(other, other.null).detected == (lag > 0.0)
-
-
-@pytest.mark.parametrize("hiss, way", [(0.0, "cubic"), (2e-4, "linear")])
-def test_inputs_are_joined_as_well_as_their_noise_allows(tmp_path, hiss, way):
-    """A damper on a prescribed motion up to 20 Hz at 2 ms: its force needs the rate of the last sample. A noise of 0.2 mm in the
-    motion is louder in the rate the more samples it is taken from."""
-    z, rng = road(5), np.random.default_rng(6)
-    force = D * CubicSpline(np.arange(SAMPLES) * STEP, z)(np.arange(SAMPLES) * STEP, 1) + 2.0 * rng.standard_normal(SAMPLES)
-    model, path = moved(tmp_path, z + hiss * rng.standard_normal(SAMPLES), force)
-    one = study.null_study(model, [experiment(m, model) for m in load([path], model)])
-    text, extended = extension.extend_file(one, None, ())
-    assert extended.interpolation == way and (way == "linear" or f'input = "{way}"' in text)
+    assert [(c.kind, c.where) for c in found.causes] == [("input_lag", "z_road")]
+    assert [(a.kind, a.where) for a in found.causes[0].alternatives] == [("sensor_delay", "force")]
+    assert found.causes[0].parameters["lag"].value == pytest.approx(0.02, rel=0.02)
 
 
 def test_a_mass_on_rubber_is_predicted(tmp_path, model):
@@ -853,25 +555,6 @@ def test_a_mass_on_rubber_is_predicted(tmp_path, model):
     assert all(gain.after_rmse < 1.07 * NOISE[name] for name, gain in found.gain.items())
 
 
-def test_two_bends_of_a_sensor_are_one_cube_in_the_file(model, sound):
-    """Rails that are soft bend a sensor, and so does a gain that bends: both write y^3, with sizes of their own."""
-    base, _ = study.begin(model, [experiment(m, model) for m in sound])
-    base = replace(base, nothing=study.loss(base, base.null), seen=study.look(base, base.null))
-    bends = [c for c in study.regression(base, base.null, []).candidates if getattr(c.what, "what", "") == "scale_bend"]
-    rails, gain = (next(c for c in bends if (c.kind, c.where) == (kind, "deflection")) for kind in ("sensor_clipping", "sensor_scale"))
-    gain = replace(gain, what=replace(gain.what, shape=2.0 * gain.what.shape))
-    e = explaining.explain(base, [Term(rails, -1e-3), Term(gain, -1e-3)], iterations=0)
-    text, extended = extension.extend_file(base, e, ())
-    assert text.count("curve_deflection = ") == 1
-    y = 0.02
-    want = sum(
-        f.value * y**3 / b.what.shape**2 for f, b in zip((f for f in e.fit.free if f.target[0] == "fault"), (rails, gain), strict=True)
-    )
-    sensor = next(s for s in extended.sensors if s.name == "deflection").expression.replace("^", "**")
-    curve = extended.parameters["curve_deflection"].value
-    assert eval(sensor, {"z_b": y, "z_w": 0.0, "curve_deflection": curve}) - y == pytest.approx(want, rel=1e-5)
-
-
 SHARE, LATE = np.linspace(0.0, 1.0, SAMPLES), 12e-3  # s
 FAULTS = {  # sensor, what it shows, and its kind
     "late": ("a_body", lambda y: CubicSpline(SHARE, y)(np.maximum(SHARE - LATE / (STEP * (SAMPLES - 1)), 0.0)), "sensor_delay"),
@@ -893,64 +576,17 @@ FAULTS = {  # sensor, what it shows, and its kind
 }
 
 
-@pytest.mark.parametrize("roll_off", [0.0, 0.05, 0.3, 0.49])
-def test_a_delay_is_written_as_it_was_fitted(roll_off):
-    """At a tenth of a radian within the delay: dead time and Pade's fraction with a roll-off r differ by less than (1/720 + r^2/2) x^4,
-    two poles not at all, and one pole leaves out the (1/2 - r) x^2 of the other."""
-    n, delay, step = 4000, 0.02, 1e-3
-    x = 0.1j
-    stiff, drag, direct, own = poles(roll_off)
-    late = stiff / (x * x + drag * x + stiff) if stiff else 1.0 / (1.0 + x)
-    written = late + direct * (1.0 - late) - own * x * late
-    t = step * np.arange(n)
-    wave = np.exp(x * t / delay)
-    shown = sum(
-        part * delayed(f(wave)[:, None], np.array([delay]), np.array([roll_off * delay**2]), step)[2000, 0]
-        for part, f in ((1.0, np.real), (1.0j, np.imag))
-    )
-    most = {0.0: 1e-4 / 720, 0.05: 1e-4 * (1 / 720 + 0.05**2 / 2), 0.3: 0.0, 0.49: 0.01 * 1e-2}[roll_off]
-    assert abs(written - shown / wave[2000]) < 1.1 * most + 1e-9
-
-
-def test_rails_are_between_a_tanh_and_a_hard_limit():
-    """At sharpness 0.3 a relative a^2/12 off the first, and log(2) of the width off the second; and its slope is 1 at nothing."""
-    y = np.linspace(-3.0, 3.0, 61)[:, None]
-    soft, hard = (railed(y, np.array([0.5]), np.array([a]))[:, 0] for a in (0.0, 200.0))
-    assert soft == pytest.approx(2.0 * np.tanh(0.5 * y[:, 0]), rel=0.3**2 / 12.0)
-    assert hard == pytest.approx(np.clip(y[:, 0], -2.0, 2.0), abs=1.01 * np.log(2.0) * 2.0 / 200.0)
-    assert railed(np.array([[1e-6]]), np.array([0.5]), np.array([4.0]))[0, 0] == pytest.approx(1e-6, rel=1e-5)
-
-
-@pytest.mark.parametrize("sharpness", [0.0, 1.0, 30.0])
-def test_rails_are_written_as_they_were_fitted(sharpness):
-    """But for the seven digits of the text."""
-    parameters: list[str] = []
-    text = extension._railed("y", 0.5, sharpness, "a", "1", parameters)
-    y = np.linspace(-3.0, 3.0, 61)
-    known = {key: float(entry.split("value = ")[1].split(",")[0]) for key, entry in (p.split(" = ", 1) for p in parameters)}
-    written = eval(text, known | {"y": y, "softplus": lambda x: np.logaddexp(0.0, x)})
-    assert written == pytest.approx(railed(y[:, None], np.array([0.5]), np.array([sharpness]))[:, 0], rel=1e-4)
-
-
-def test_loads_that_cancel_each_other_count_in_full(model):
-    """A start in motion of a quarter vehicle of 445 kg, explained by loads of 191 kN and -229 kN."""
-    terms = [SimpleNamespace(candidate=SimpleNamespace(kind="constant_force"), gain=g) for g in (-190.8e3, 228.8e3)]
-    assert explanation.loaded(SimpleNamespace(terms=terms)) == pytest.approx(419.6e3) and explanation.weight(model) == pytest.approx(
-        9.80665 * (M_B + M_W)
-    )
-
-
-def test_a_delay_beyond_the_recording_leaves_its_start():
-    """A fit may try it, and must not ask for as much memory."""
-    late = delayed(np.arange(100.0)[:, None] + 3.0, np.array([1e10]), np.zeros(1), 1e-3)
-    assert late[:, 0] == pytest.approx(np.full(100, 3.0), abs=1e-9)
-
-
-@pytest.mark.parametrize("roll_off", [0.0, 0.3, 0.5])
-def test_a_delay_is_written_in_steps_that_it_is_stable_in(roll_off):
-    """Steps of 1 of the faster pole; Runge-Kutta of order 4 is stable to 2.785. Pade's poles are at sqrt(12), those of 1/(1 + x + x^2/5)
-    at 5/2 (1 +- sqrt(1/5)), that of one pole at 1."""
-    assert fastest(roll_off) == pytest.approx({0.0: 12.0**0.5, 0.3: 2.5 * (1.0 + 0.2**0.5), 0.5: 1.0}[roll_off])
+def test_a_delay_is_written_as_it_was_fitted():
+    """At a tenth of a radian within the delay: dead time and Pade's fraction differ by less than x^5/720."""
+    delay, x = 0.02, 0.1j
+    found = late.written("u", ("t", "late", "rate"), "m", delay)
+    known = {"u": 1.0, "t": delay}
+    # der(x) is x/delay times it: rate = x*late, and x*rate = 12 (u - late) - 6 rate
+    assert found.equations == ('late = "der(late)*t = rate"', 'rate = "der(rate)*t = 12*(u - late) - 6*rate"')
+    known["late"] = 12.0 / (x * x + 6.0 * x + 12.0)
+    known["rate"] = x * known["late"]
+    assert abs(eval(found.expression, known) - np.exp(-x)) < abs(x) ** 5 / 720.0 * 1.1
+    assert late.substeps(delay, 1e-3) == 1 and late.substeps(delay, 10.0 * delay) == 35  # poles of 12^(1/2) at steps of 1
 
 
 @pytest.mark.parametrize("fault", sample(FAULTS, "late", "drifting gain", "near its limits"))
@@ -981,14 +617,14 @@ def test_a_load_put_on_at_the_start_is_no_start_in_motion(tmp_path, model):
     assert causes == {("constant_force", "body"), ("cubic_spring", "spring")}
 
 
-def test_clocks_that_drift_apart_are_on_no_list(tmp_path, model):
+def test_clocks_that_drift_apart_are_named(tmp_path, model):
     """Sensors run ahead of the road by 100 ppm, 1 ms after 10 s."""
     z, t = road(5), np.arange(SAMPLES) * STEP
     early = {k: CubicSpline(t, y)(np.minimum(t * (1.0 + 1e-4), t[-1])) for k, y in drive(z, lambda s, v: 0.0).items()}
     found = diagnosis.diagnose(model, load([record(tmp_path / "drift.csv", z, early, 15)], model))
-    assert [c.kind for c in found.causes] == ["outside_taxonomy"] and found.verdict == "unexplained"
-    (said,) = [n for n in found.notes if "clocks" in n]
-    assert float(said.split(" by ")[1].split(" ppm")[0]) == pytest.approx(100.0, rel=0.03)
+    (cause,) = found.causes
+    assert (cause.kind, cause.where, found.verdict) == ("input_drift", "z_road", "explained")
+    assert abs(cause.parameters["drift"].value) == pytest.approx(1e-4, rel=0.03)
 
 
 @pytest.mark.long
@@ -999,13 +635,6 @@ def test_a_spring_that_gets_stiffer_is_on_no_list(tmp_path, model):
     found = diagnosis.diagnose(model, load([record(tmp_path / "levelled.csv", z, sensors, 16)], model))
     assert [c.kind for c in found.causes] == ["outside_taxonomy"] and found.verdict == "unexplained"
     assert any("stiffness of spring changes" in n for n in found.notes)
-
-
-def test_noise_does_not_change_a_vehicle(model, sound):
-    own, _ = study.begin(model, [experiment(m, model) for m in sound])
-    seen = study.look(own, own.null)
-    found = steady.change(own, own.null, seen)
-    assert found.surprise < 10.0  # chance of e^-10, of four that are looked at
 
 
 @pytest.mark.parametrize("seed", sample([1, 2, 3], 1))
@@ -1019,19 +648,6 @@ def test_noise_of_the_road_before_and_after_a_bump_does_not_change_a_vehicle(tmp
     path = record(tmp_path / "bump.csv", z + 3e-5 * np.random.default_rng(seed).standard_normal(SAMPLES), sensors, seed + 10)
     found = diagnosis.diagnose(model, load([path], model))
     assert found.verdict == "no_discrepancy" and found.causes == ()
-
-
-@pytest.mark.parametrize("loss", [0.1 * D, 10.0 * D])
-def test_a_damper_does_not_fade_farther_than_to_nothing(model, loss):
-    """Gained in a first part of a fall only, a loss of ten times the damping would drive the vehicle on a hotter road."""
-    place = plant.places(model)[0]
-    law = hypotheses.Basis(
-        "damper_fading", 0, "heating_damper", ("damping", "N*s/m"), {"work": (1.0, "m^2/s"), "cooling": (9.0, "s")}, -1, ()
-    )
-    term = Term(score.Candidate("damper_fading", "damper", -1, False, law), -loss)
-    _, parameters, free = build.element(term, place, "x", model)
-    (damping,) = (f for f in free if f.target == "x_damping")
-    assert (damping.low, damping.high) == (-D, 0.0) and damping.low < damping.value == parameters["x_damping"][0]
 
 
 def test_a_start_in_motion_is_the_start(tmp_path):
@@ -1087,7 +703,7 @@ def test_a_cause_that_makes_the_holdout_worse_is_not_shipped(tmp_path, model, so
     train = load([record(tmp_path / "stops.csv", z, drive(z, lambda s, v: 10e3 * max(s - 0.006, 0.0)), 15)], model)
     found = diagnosis.diagnose(model, train, sound, tmp_path / "out")
     assert [c.kind for c in found.causes] == ["outside_taxonomy"] and found.verdict == "unexplained"
-    assert any("bump_stop at spring would explain the training" in note for note in found.notes)
+    assert any("bump stop at spring would explain the training" in note for note in found.notes)
     assert penode_gen.load(tmp_path / "out" / "model_extended.toml").elements == model.elements
     assert all(g.after_rmse < 1.05 * g.before_rmse for g in found.gain.values())
 
@@ -1102,14 +718,6 @@ def test_tolerances_that_make_the_holdout_worse_are_not_shipped(tmp_path, model,
     shipped = penode_gen.load(tmp_path / "out" / "model_extended.toml")
     assert {k: p.value for k, p in shipped.parameters.items()} == {k: p.value for k, p in model.parameters.items()}
     assert all(g.after_rmse < 1.001 * g.before_rmse for g in found.gain.values())  # how inputs are joined may only help
-
-
-def test_a_small_mass_gets_steps_that_it_is_stable_in(model):
-    """A rate of 2560 1/s at 2 ms is beyond the 2.785 of Runge-Kutta; a step is to be at most 1 of it."""
-    values = {"x0_mass": 5.0, "x0_stiffness": 7e4, "x0_damping": 12_800.0}
-    term = SimpleNamespace(candidate=SimpleNamespace(what=("absorber", 0, 19.0, 1.0)))
-    fitted = SimpleNamespace(fit=SimpleNamespace(value=values.__getitem__))
-    assert extension._fine(SimpleNamespace(model=model), term, "x0", fitted) == 6
 
 
 def test_noise_floor_is_that_of_coloured_sensors(tmp_path, model):

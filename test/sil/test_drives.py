@@ -189,8 +189,11 @@ def _fit(nu, floor):
     return Fit((), None, nu, np.zeros((*nu.shape, 0)), used, variance, value, value)
 
 
+PLACES = "shaft", "bearing", "rotor"
+
+
 def _form(kind, where, note=""):
-    return Form(kind, where, "force", 0, (), note)
+    return Form(kind, where, "force", PLACES.index(where), (), note)
 
 
 def test_every_place_is_tried():

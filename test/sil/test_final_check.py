@@ -19,7 +19,7 @@ from penode_sil.cli import cli
 from penode_sil.diagnosis import diagnose, study
 from penode_sil.diagnosis.checks import final, rules
 from penode_sil.diagnosis.checks.case import Case, End
-from penode_sil.diagnosis.checks.differing import different, has_common_cause
+from penode_sil.diagnosis.checks.differing import common
 from penode_sil.diagnosis.checks.written import write_extended
 from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.entries import extends
@@ -75,7 +75,8 @@ def ended(folder, force, moving=False):
     (folder / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS))
     nominal = penode_gen.load(folder / "rig.toml")
     train, held = (load([record(folder / f"{name}.csv", seed, moving)], nominal) for name, seed in (("train", 1), ("later", 2)))
-    one = next(s for s in study.begin(nominal, [experiment(m, nominal) for m in train]) if s.moving == moving)
+    one = study.null_study(nominal, [experiment(m, nominal) for m in train])
+    one = one if moving else replace(one, null=study.refit(one, [f for f in one.null.free if f.target[0] != "start"]), moving=False)
     one = study.replace(one, seen=study.look(one, one.null))
     (folder / "out").mkdir()
     text = LEARNT.format(extends=extends(nominal.path.resolve()), force=force)
@@ -225,9 +226,12 @@ def test_recordings_that_differ_by_a_parameter_have_a_set_each(tmp_path):
         errors = simulated(tmp_path / "out" / "model_extended.toml", tmp_path / f.recording, f"{found.simulated} --set {f.set}")
         assert f.extended == errors[f.signal]["value"] and f.extended < 1.2 * f.noise
     train = load([record(path, seed, False, FRICTION, MASS) for seed, path in enumerate(paths)], nominal)
-    one = study.begin(nominal, [experiment(m, nominal) for m in train])[0]
-    case = Case(nominal, nominal, train, (), (), (), tmp_path / "out", lambda text: None, lambda share, doing: None)
-    assert different(case, one) is None and has_common_cause(case, one, one.null)
+    found = diagnose(nominal, train, (), tmp_path / "out")
+    assert [c.kind for c in found.causes] == ["coulomb_friction"]
+    one = study.begin(nominal, [experiment(m, nominal) for m in train])
+    right = replace(one.null, simulated=tuple(e.y for e in one.experiments))
+    assert common(one, End(found, one, nominal, right, []), one.null)
+    assert not common(one, End(replace(found, causes=2 * found.causes), one, nominal, right, []), one.null)
 
 
 def test_a_high_pass_of_a_sensor_is_no_agreement(tmp_path):
@@ -235,7 +239,7 @@ def test_a_high_pass_of_a_sensor_is_no_agreement(tmp_path):
     (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS))
     nominal = penode_gen.load(tmp_path / "rig.toml")
     train = load([record(tmp_path / "train.csv", 1, False, 0.0, MASS, 0.3)], nominal)
-    one = study.begin(nominal, [experiment(m, nominal) for m in train])[0]
+    one = study.begin(nominal, [experiment(m, nominal) for m in train])
     one = study.replace(one, seen=study.look(one, one.null))
     case = Case(nominal, nominal, train, (), (), (), tmp_path / "out", lambda text: None, lambda share, doing: None)
     same = f'[model]\n{extends(nominal.path.resolve())}\nname = "rig_extended"\n'

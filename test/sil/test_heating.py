@@ -53,6 +53,6 @@ def test_a_damper_that_its_work_warms_is_found(tmp_path, show):
     found = real.answer(known, places, experiments, fastest, "default", lambda text: None)
     show([(c.kind, c.where, {k: (v.value, v.ci95) for k, v in c.parameters.items()}) for c in found.causes])
     (cause,) = found.causes
-    assert (cause.kind, cause.where) == ("damper_fading", "spring")
+    assert (cause.kind, cause.where) == ("damper_fading", "damper")
     assert [p.law for t in found.terms if t.form.kind == cause.kind for p in t.form.parts] == ["heating_damper"]
     assert cause.parameters["loss"].value == pytest.approx(lost, rel=0.03)

@@ -45,7 +45,7 @@ def found(monkeypatch: pytest.MonkeyPatch):
         monkeypatch.setattr(Rounds, "good", good)
         monkeypatch.setattr(Rounds, "beside", beside)
         monkeypatch.setattr(rounds, "propose", lambda at, terms, log, stiffer: ([lag], None))
-        monkeypatch.setattr(rounds, "_scored", lambda at, problem, blocks, t: t)
+        monkeypatch.setattr(rounds, "scored", lambda at, problem, blocks, t: t)
         monkeypatch.setattr(rounds, "adopt", lambda at, t, number: (bench(*at.kinds, t.form.kind, level=level), [t.term]))
         monkeypatch.setattr(rounds, "_based", lambda at, blocks: (at, np.full(4, -10.0)))
         start.problem = lambda wide: None

@@ -1,19 +1,47 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Which of several forms a search by innovations takes, and whose answer stands: made-up trials, no simulation."""
+"""Which of several forms the search takes: made-up trials, no simulation."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import by_noise, propose, rounds
+import penode_gen
+from penode_sil.diagnosis import plant, propose, rounds
 from penode_sil.diagnosis.catalogue import springs
 from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
 from penode_sil.diagnosis.result import Cause, Value
+from penode_sil.diagnosis.terms import Term, Trial
 
+PLANT = """
+[model]
+name = "two"
+sample_time = "2 ms"
+[parameters]
+m = { value = 20, unit = "kg" }
+k = { value = 5000, unit = "N/m" }
+d = { value = 300, unit = "N*s/m" }
+q = { value = 300, unit = "N*s^2/m^2" }
+f = { value = 3, unit = "N" }
+edge = { value = 0.01, unit = "m/s" }
+[inputs]
+push = { unit = "N" }
+[bodies]
+body = { mass = "m", position = "z", velocity = "v_z" }
+wheel = { mass = "m", position = "w", velocity = "v_w" }
+[elements]
+actuator = { between = ["body", "ground"], law = "expression", force = "-push" }
+coil = { between = ["body", "wheel"], law = "linear_spring", stiffness = "k" }
+strut = { between = ["wheel", "body"], LAW }
+[outputs]
+z = { value = "z", unit = "m" }
+[sensors]
+z = { value = "z", unit = "m", noise = 1e-4 }
+"""
 BASE = np.zeros(4)
 SLIDES, PUSHES = Part("coulomb_friction", ("force", "N")), Part("constant_force", ("force", "N"))
 LOOSE, LATE = Part("loose_damper", ("damping", "N*s/m")), Part("maxwell_bushing", ("stiffness", "N/m"))
@@ -46,7 +74,36 @@ def test_another_law_of_a_name_goes_before_a_new_name_that_is_hardly_better():
 def test_of_curves_that_predict_equally_well_the_one_with_fewer_values_is_named():
     stop, cube = trial("bump_stop", 100.0, LATE, free=2), trial("cubic_spring", 98.0, LOOSE)
     assert rounds.simplest([stop, cube], BASE, []) is cube  # 8 nats less, of 10 that a value has to gain
-    assert rounds.simplest([stop, trial("cubic_spring", 97.0, LOOSE)], BASE, []) is stop
+    assert rounds.simplest([stop, trial("cubic_spring", 95.0, LOOSE)], BASE, []) is stop
+
+
+def test_a_place_is_the_same_by_either_of_its_names():
+    """Friction is named at the damper of a place, a spring at its spring: the model has both at one place, and neither hides the other."""
+    there = (("stribeck_friction", "strut", 0), ("bump_stop", "coil", 0), ("k", "tyre", 1))
+    peak, spring, far = (Form(kind, where, "force", index) for kind, where, index in there)
+    taken = [Term(Form("coulomb_friction", "strut", "force", 0), (), ())]
+    assert propose._taken(peak, taken) and not propose._taken(replace(peak, index=1), taken)
+    small = Trial(peak, None, None, 0.0, None)
+    assert not rounds._hidden(Trial(spring, None, None, 0.0, None, 1.0), small)
+    assert rounds._hidden(Trial(far, None, None, 0.0, None, 1.0), small)
+    assert not propose._taken(Form("input_gain", "push", "input_gain", 0), taken)
+
+
+@pytest.mark.parametrize(
+    "law, name",
+    [
+        ('law = "linear_damper", damping = "d"', "strut"),
+        ('law = "coulomb_friction", force = "f", transition = "edge"', "strut"),
+        ('law = "expression", force = "q*v*abs(v_strut)"', "strut"),
+        ('law = "expression", force = "d*v_strut + k*s_strut"', "coil"),
+        ('law = "linear_spring", stiffness = "k"', "coil"),
+    ],
+)
+def test_friction_is_named_at_the_damper_of_its_place(tmp_path, law, name):
+    """Where the force of an element depends on the rate and not on the deflection; at the first element where none does, or at the body."""
+    (tmp_path / "model.toml").write_text(PLANT.replace("LAW", law))
+    place, *free = plant.places(penode_gen.load(tmp_path / "model.toml"))
+    assert (place.name, place.loss) == ("coil", name) and [p.loss for p in free] == ["body", "wheel"]
 
 
 def test_what_is_a_part_of_a_form_is_tried_too():
@@ -59,20 +116,6 @@ def test_a_cause_whose_interval_holds_0_has_no_size(low, high, unsized):
     gap = Value(0.5 * (low + high), "m", (low, high))
     assert Cause("backlash", "spring", {"gap": gap}, 0.9).may_be_nothing is unsized
     assert not Cause("bump_stop", "spring", {"gap": gap, "stiffness": Value(1e4, "N/m", (9e3, 1.1e4))}, 0.9).may_be_nothing
-
-
-def test_what_may_be_nothing_is_not_named_beside_other_causes():
-    """Fitted sizes only: not the share of lost samples, which is counted, nor a parameter of the file; and not the only cause."""
-    wide = (-1e-5, 3e-4)
-    play, lost = (
-        Cause("backlash", "spring", {"gap": Value(1e-4, "m", wide)}, 0.9),
-        Cause("sensor_dropout", "x", {"share": Value(1e-4, "1", (0.0, 3e-4))}, 0.9),
-    )
-    own = Cause("wrong_parameter", "k", {"k": Value(1e-4, "N/m", wide)}, 0.9)
-    study = SimpleNamespace(model=SimpleNamespace(parameters={"k": None}))
-    best = SimpleNamespace(groups=(("backlash", "spring"), ("wrong_parameter", "k")))
-    assert by_noise._with_a_size(study, best, (play, lost, own)) == ((lost, own), [play])
-    assert by_noise._with_a_size(study, best, (play,)) == ((play,), [])
 
 
 def test_a_stop_stays_away_from_the_middle():

@@ -8,12 +8,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from penode_sil.diagnosis.catalogue.form import Form, Part
+from penode_sil.diagnosis.evidence.gain import Level
 from penode_sil.diagnosis.fit import Free
+from penode_sil.diagnosis.innovate import _own_names
 from penode_sil.diagnosis.reconsider import reconsidered
-from penode_sil.diagnosis.rounds import Accepted, Grown
+from penode_sil.diagnosis.rounds import MIN_FORM, Accepted, Grown, simplest
 from penode_sil.diagnosis.terms import Term, Trial
+from penode_sil.diagnosis.worth import WORTH
 
 NAMES = {
     "friction": "coulomb_friction",
@@ -178,3 +182,43 @@ def test_a_constant_beside_a_friction_is_left_for_a_law_that_pulls_to_one_side()
     assert kinds(reconsidered(more, grown([both], scores)).accepted) == ("coulomb_friction",)
     scores["stribeck_friction", "cubic_spring"] = 1195.0
     assert kinds(reconsidered(rounds, grown([both], scores)).accepted) == ("coulomb_friction",)  # with its constant: 5 nats are not enough
+
+
+def gained(kind: str, where: str, index: int, gain: float) -> Accepted:
+    form = Form(kind, where, "force", index)
+    return Accepted(Trial(form, Term(form, (), ()), None, gain, None), index, (), ())
+
+
+@pytest.mark.parametrize("share, named", [(0.9, False), (1.1, True)])
+def test_a_form_that_makes_up_for_the_curve_of_another_at_its_place_has_no_name(share, named):
+    """Where it gains less than MIN_FORM of what that does; at another place it has one. One that is not large has none, and counts for
+    nothing."""
+    forms = [gained("degressive_damper", "damper", 0, 1000.0), gained("cubic_spring", "spring", 0, share * MIN_FORM * 1000.0)]
+    forms += [gained("coulomb_friction", "rail", 1, 0.1 * MIN_FORM * 1000.0), gained("bump_stop", "rail", 1, 500.0)]
+    end = Grown(None, np.zeros(4), tuple(forms), (True, True, True, False), ())
+    assert _own_names(end) == [True, named, True, False]
+
+
+def friction(kind: str, laws: Sequence[str], nats: float, level: float) -> Trial:
+    form = Form(kind, "rail", "force", 0, tuple(Part(law, ("force", "N")) for law in laws))
+    free = tuple(Free(f"{kind}_{law}", 1.0, 1.0) for law in laws)
+    return Trial(form, Term(form, (), free), None, nats, Level(level, 1.0), blocks=np.full(4, nats / 4.0))
+
+
+NESTED, OTHER = ("coulomb_friction", "peak"), ("bouc_wen", "peak")
+
+
+@pytest.mark.parametrize(
+    "level, laws, enough",
+    [
+        (0.0, NESTED, MIN_FORM**2 * 1000.0),
+        (0.25 * WORTH, NESTED, 0.5 * MIN_FORM * 1000.0),
+        (0.5 * WORTH, NESTED, MIN_FORM * 1000.0),
+        (0.0, OTHER, MIN_FORM * 1000.0),
+    ],
+)
+def test_more_laws_have_to_gain_less_where_little_is_unmodelled(level, laws, enough):
+    """Of forms of one curve, one that has all laws of a simpler one and more, against one of other laws: beside one of 1000 nats."""
+    for more, kind in ((0.9 * enough, "coulomb_friction"), (1.1 * enough, "stribeck_friction")):
+        trials = [friction("stribeck_friction", laws, 1000.0 + more, level), friction("coulomb_friction", NESTED[:1], 1000.0, level)]
+        assert simplest(trials, np.zeros(4), ()).form.kind == kind

@@ -156,7 +156,7 @@ def plant(request, tmp_path_factory):
         file, recording = folder / "car.toml", record(folder / "a.csv", z, drive(z, lambda s, v: 3e8 * s**3), 12)
         file.write_text(MODEL)
     model = penode_gen.load(file)
-    found = study.begin(model, [experiment(m, model) for m in load([recording], model)])[0]
+    found = study.begin(model, [experiment(m, model) for m in load([recording], model)])
     e, before = found.experiments[0], found.null.simulated[0]
     shown = residual.channels(e, model, before, None, residual.noise_floor(found, 0))
     surfaces = restoring.surfaces(found, None, None)

@@ -125,7 +125,7 @@ def stiff(tmp_path_factory):
     model = penode_gen.load(folder / "car.toml")
     z = road(11)
     recording = record(folder / "a.csv", z, drive(z, lambda s, v: 3e8 * s**3), 12)
-    return study.begin(model, [experiment(m, model) for m in load([recording], model)])[0]
+    return study.begin(model, [experiment(m, model) for m in load([recording], model)])
 
 
 def test_forces_of_elements_are_their_laws(stiff):

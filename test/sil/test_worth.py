@@ -11,8 +11,9 @@ import pytest
 
 from penode_sil.diagnosis.evidence import prior
 from penode_sil.diagnosis.evidence.colour import Colour
+from penode_sil.diagnosis.evidence.observer import Record
 from penode_sil.diagnosis.fit import Free
-from penode_sil.diagnosis.real import _shifts
+from penode_sil.diagnosis.offsets import shifts
 from penode_sil.diagnosis.worth import own, remaining
 
 
@@ -72,17 +73,19 @@ def test_what_a_file_states_costs_no_more_than_a_cause():
     assert prior.stated([near, far, Free("q", 9.0, 1.0, sigma=0.1)]) == prior.cost(near) + prior.cost(far)
 
 
-def bench(y, colour, level=0.001):
-    """A bench of one sensor with a signal y [n], noise 0.1, updated every 4 samples, whose free run is off by `nu`."""
+def bench(y, colour, level=0.001, driven=0.0):
+    """A bench of one sensor with a signal y [n], noise 0.1, updated every 4 samples, whose free run is off by `nu`; `driven`: variance that
+    noise of inputs has in the means of the sensor at its end."""
 
     def problem(nu):
         predictor = SimpleNamespace(predict=lambda free, shifts, by: (SimpleNamespace(nu=[nu[None, :, None]]),))
         return SimpleNamespace(predictor=predictor)
 
     run = SimpleNamespace(free=(), by=None)
-    record, noise = SimpleNamespace(y=y[:, None]), np.array([0.1])
+    record, noise = Record("r", 1e-3, np.zeros((len(y), 0)), y[:, None]), np.array([0.1])
+    gains = SimpleNamespace(driven=lambda updates: np.full(1, driven if updates == len(y) // 4 else np.nan))
     made = SimpleNamespace(level=SimpleNamespace(size=level), colour=colour, noise=noise, update=4, records=(record,))
-    return lambda nu: (SimpleNamespace(**vars(made), problem=lambda: problem(nu)), run)
+    return lambda nu: (SimpleNamespace(**vars(made), problem=lambda: problem(nu), gains=lambda: gains), run)
 
 
 SIGNAL = 3.0 * np.sqrt(2.0) * np.sin(0.01 * np.pi * np.arange(20_000))  # rms 3
@@ -98,6 +101,14 @@ def test_what_remains_is_what_a_free_run_misses_beyond_noise(colour, stated, rem
     assert remaining(*bench(SIGNAL, taps)(nu), np.array([stated])) == pytest.approx(remains, rel=0.03)
 
 
+@pytest.mark.parametrize("driven, remains", [(0.01, 0.0361), (0.0225, 0.001)])
+def test_what_noise_of_inputs_does_to_a_free_run_does_not_remain(driven, remains):
+    """The same miss of a power of 0.025 in all. Of 0.0125 to three deviations, 0.01325, there is 0.01175 beyond: 0.0361 of the signal.
+    Where noise of the inputs does as much as the miss, nothing is: the level of the bench then."""
+    nu = 0.05 * np.random.default_rng(1).standard_normal(5000) + 0.15 * np.sqrt(2.0) * np.sin(0.004 * np.pi * np.arange(5000))
+    assert remaining(*bench(SIGNAL, None, driven=driven)(nu), np.array([0.1])) == pytest.approx(remains, rel=0.03)
+
+
 def test_only_noise_remains_of_a_sound_model():
     """The level of the bench then."""
     nu = 0.05 * np.random.default_rng(2).standard_normal(5000)
@@ -111,6 +122,6 @@ def test_curves_that_cancel_each_other_shift_a_mean_both():
     slopes = np.tile([3.0, -2.0, 5.0, 11.0], (6, 1, 1)) + np.linspace(-1.0, 1.0, 6)[:, None, None]
     run = SimpleNamespace(free=tuple(free), slopes=slopes, used=np.ones((6, 1), bool))
     terms = [SimpleNamespace(free=free[:1]), SimpleNamespace(free=free[1:3])]
-    assert _shifts(SimpleNamespace(colour=None), run, terms) == pytest.approx([4.5])
+    assert shifts(SimpleNamespace(colour=None), run, terms) == pytest.approx([4.5])
     half = Colour(np.full((1, 1), 0.5), np.array([1.0]))
-    assert _shifts(SimpleNamespace(colour=half), run, terms) == pytest.approx([9.0])
+    assert shifts(SimpleNamespace(colour=half), run, terms) == pytest.approx([9.0])

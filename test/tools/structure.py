@@ -12,9 +12,7 @@ circular imports   modules of penode_gen and penode_sil, and C headers, that imp
 silenced lines     those with fmt: skip, fmt: off, noqa, type: ignore, clang-format off, NOLINT
 crowded folders    more than 25 files; generated models and files of data (.csv, .json, .png) do not count
 named thresholds   module-level numbers with an UPPER_CASE name in penode_sil: NAME = number, or arithmetic of numbers; the same
-                   in a class Rules; without the next
-thresholds of innovations  the same in the rooms of the diagnosis by innovations, which are to replace the search by sensor noise: a
-                   budget of 50, for all that is left of a diagnosis when that one has gone
+                   in a class Rules
 tabled numbers     numbers inside module-level tuples, tables and calls with an UPPER_CASE name in penode_sil: TABLE = (number, ...)
 compared numbers   numbers other than 0, 1 and -1 inside comparisons in penode_sil: x > 0.3
 settings of training  numbers of the class Settings of penode_sil.training, its one table: a budget
@@ -54,21 +52,10 @@ RATCHETS = (
     "tabled numbers",
     "compared numbers",
 )
-BUDGETS = (
-    "thresholds of innovations",
-    "settings of training",
-    "runtime lines",
-    "elementary lines",
-    "wire protocol lines",
-    "filter lines",
-    "monitor lines",
-)
+BUDGETS = ("settings of training", "runtime lines", "elementary lines", "wire protocol lines", "filter lines", "monitor lines")
 ELEMENTARY = {"pen_elementary.h", "pen_parts.h", "pen_trig.c", "pen_atan.c", "pen_log.c", "pen_root.c"}
 
-NEWER, TABLE = BUDGETS[:2]
-ROOMS = re.compile(
-    r"sil/penode_sil/diagnosis/(evidence|catalogue)/|sil/penode_sil/diagnosis/(propose|terms|worth|rounds|reconsider|innovate|parameters|real|unmodelled|verdict|beginning)\.py"
-)
+TABLE = BUDGETS[0]
 
 Found = dict[str, list[str]]
 
@@ -237,7 +224,7 @@ def look(root: Path) -> tuple[dict[str, int], Found]:
         functions = c_functions(text) if path.suffix in {".c", ".h"} else python_functions(trees[path]) if path in trees else ()
         found["long functions"] += [f"{name}:{first}: {n} lines" for first, n in functions if n > FUNCTION_LINES]
         if name.startswith("sil/penode_sil/") and path.suffix == ".py":
-            kind = NEWER if ROOMS.match(name) else TABLE if name.endswith("training/settings.py") else "named thresholds"
+            kind = TABLE if name.endswith("training/settings.py") else "named thresholds"
             found[kind] += [f"{name}:{line}" for line in thresholds(trees[path])]
             found["tabled numbers"] += [f"{name}:{line}" for line in tabled(trees[path])]
             found["compared numbers"] += [f"{name}:{line}" for line in compared(trees[path])]
@@ -248,7 +235,7 @@ def look(root: Path) -> tuple[dict[str, int], Found]:
             found["circular imports"] += circular(python_imports(trees, root / package))
     found["circular imports"] += circular(header_includes(files))
     counts = {kind: len(items) for kind, items in found.items()}
-    return counts | {kind: n for kind, n in runtime.items() if kind not in (NEWER, TABLE)}, found
+    return counts | {kind: n for kind, n in runtime.items() if kind != TABLE}, found
 
 
 def compare(kept: dict[str, int], counts: dict[str, int], found: Found) -> list[str]:

@@ -9,24 +9,28 @@ layers move (Levenberg-Marquardt, exact derivatives), from where they are, over 
 from __future__ import annotations
 
 import json
+import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+import penode_gen
 from penode_gen import units
 from penode_gen.laws import LAWS
 from penode_gen.model import Element, Model
 from penode_gen.networks import Affine, Dense, Network, layer_slope, layer_value
 from penode_gen.sets import fold
 
-from .explanation import Explanation
-from .hypotheses import Basis, size
-from .naming import Curve
+from . import measuring
+from .catalogue.form import Moved, Part
+from .checks.case import Case
+from .smoother import size
 from .study import Study
+from .terms import Term
 
 Array = NDArray[np.float64]
 POINTS = 600  # half of them evenly over the range, half where the motion was
@@ -46,20 +50,37 @@ class Taught:
     missing: float
 
 
-def taught(study: Study, e: Explanation) -> list[Taught]:
-    """All networks of one input that can take up a cause beside them; none if a cause has memory, if no network sees it, or
-    if the code that runs would refuse what was learnt."""
+def absorbed(case: Case, study: Study, terms: Sequence[Term], values: Mapping[str, float]) -> tuple[dict[str, object], list[str]]:
+    """The effect of fitted terms as a parameter set, written into the case's folder: what goes into diagnosis.json, and a note; nothing
+    where no network can take them up."""
+    learnt = taught(study, terms, values)
+    if not learnt:
+        return {}, []
+    beside = Path(os.path.relpath(case.nominal.path.resolve(), case.output.resolve()))
+    model = penode_gen.load(write(study, values, learnt, beside, case.output))
+    gain = measuring.measure(study, model, case.unused, SET)[0] if case.unused else {}
+    names = ", ".join(t.element for t in learnt)
+    entry = {"file": FILE, "set": SET, "networks": {t.port: {"missing": t.missing} for t in learnt}, "gain": gain}
+    after = ", ".join(f"{k} {g.after_rmse:.3g} {g.unit}" for k, g in gain.items())
+    note = f"{names} can learn it: {FILE} has a set for the code that runs already"
+    return entry, [note + f"; hold-out after: {after}" * bool(after)]
+
+
+def taught(study: Study, terms: Sequence[Term], values: Mapping[str, float]) -> list[Taught]:
+    """All networks of one input that can take up laws of `terms` beside them, as fitted; none if a law has memory, if no network sees it,
+    or if the code that runs would refuse what was learnt."""
     chosen = study.model.sets[study.set_name].networks if study.model.sets else {}
-    values = {f.target: f.value for f in e.fit.free}
     found = []
     for element in study.model.elements:
         if element.law != "network" or len(element.network_inputs) != 1 or element.network not in chosen:
             continue
         port, network = study.model.networks[element.network], chosen[element.network]
         plain = all(units.factor(u) == 1.0 for u in (*port.input_units, port.output_unit))
-        own = [(t, n) for t, n in zip(e.terms, e.built.names, strict=True) if _fits(study, t.candidate.what, element)]
+        k = next(k for k, p in enumerate(study.places) if any(name == element.name for name, _ in p.elements))
+        beside = [t for t in terms if t.form.how == "force" and t.form.index == k]
+        own = [(gain, part) for t in beside for gain, part in t.laws(values) if _fits(part, element)]
         if own and plain and _movable(network):
-            x, law = _lesson(study, element, network, Curve(*zip(*own, strict=True)), values, own[0][0].candidate.what.place)
+            x, law = _lesson(study, element, network, own, k)
             learnt, left = learn(network, x[:, None], network.evaluate(x[:, None])[:, 0] + law)
             if network.input_min is not None:
                 learnt = replace(learnt, input_min=np.array([np.min(x)]), input_max=np.array([np.max(x)]))
@@ -69,20 +90,17 @@ def taught(study: Study, e: Explanation) -> list[Taught]:
     return found
 
 
-def _fits(study: Study, what: object, element: Element) -> bool:
-    """Does an elementary law act where a network does, on the same input, without memory?"""
-    if not isinstance(what, Basis) or all(name != element.name for name, _ in study.places[what.place].elements):
+def _fits(part: Part, element: Element) -> bool:
+    """Is a law one of the same input as a network, without memory?"""
+    known = LAWS.get(part.law)
+    if part.load or (known and known.states):
         return False
-    if what.law in LAWS and LAWS[what.law].states:
-        return False
-    text = LAWS[what.law].force if what.law in LAWS else what.law
+    text = known.force if known else part.law
     return {{"s": "deflection", "v": "rate"}[w] for w in re.findall(r"\b[sv]\b", text)} == {element.network_inputs[0]}
 
 
-def _lesson(
-    study: Study, element: Element, network: Network, curve: Curve, values: Mapping[object, float], place: int
-) -> tuple[Array, Array]:
-    """Inputs of the network, and the force that the law adds there [points]."""
+def _lesson(study: Study, element: Element, network: Network, laws: Sequence[tuple[float, Part]], place: int) -> tuple[Array, Array]:
+    """Inputs of the network, and the force that the laws add there [points]."""
     sense = next(sense for name, sense in study.places[place].elements if name == element.name)
     by_rate = element.network_inputs[0] == "rate"
     moved = np.concatenate([sense * (m.v if by_rate else m.s) for m in (s.motions[place] for s in study.seen)])
@@ -92,8 +110,8 @@ def _lesson(
         low, high = min(low, float(network.input_min[0])), max(high, float(network.input_max[0]))
     x = np.concatenate([np.linspace(low, high, POINTS // 2), np.quantile(moved, np.linspace(0.0, 1.0, POINTS // 2))])
     zero = np.zeros_like(x)
-    force = curve(zero, sense * x, values) if by_rate else curve(sense * x, zero, values)
-    return x, sense * force
+    along = Moved(zero, sense * x, zero) if by_rate else Moved(sense * x, zero, zero)
+    return x, sense * np.sum([gain * part.along(along) for gain, part in laws], axis=0)
 
 
 def _movable(network: Network) -> bool:
@@ -181,9 +199,8 @@ def as_json(network: Network) -> str:
     return json.dumps(top, indent=1)
 
 
-def write(study: Study, e: Explanation, learnt: list[Taught], beside: Path, output: Path) -> Path:
+def write(study: Study, values: Mapping[str, float], learnt: list[Taught], beside: Path, output: Path) -> Path:
     """model_absorbed.toml and its networks into `output`; `beside` is the path from there to the nominal file."""
-    values = {f.target: f.value for f in e.fit.free}
     lines = [
         f"# The nominal model with one more set, in which {', '.join(t.element for t in learnt)} includes what the recordings show.",
         "# It has the layout of the nominal code: it can be staged into a running controller.",

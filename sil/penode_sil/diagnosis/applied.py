@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""A model file with the result of a search by innovations."""
+"""A model file with the result of a search."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from penode_gen import units
 from penode_gen.laws import LAWS
 from penode_gen.model import Element, Model
 
-from . import late
-from .catalogue import drives
+from . import clipping, late
+from .catalogue import drives, stem
 from .catalogue.actuators import ACTUATORS
 from .entries import extends, table, toml, unlike
 from .evidence.bench import Bench
@@ -39,7 +39,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     rename: dict[str, str] = {}
     for t in forces:
         for name in t.elements:
-            rename[name] = unlike(t.form.kind, {*taken, *rename.values()})
+            rename[name] = unlike(stem(t.form.kind), {*taken, *rename.values()})
 
     def named(text: str) -> str:
         return re.sub(r"\b((?:[Fsv]_)?)(x\d+_\d+_\d+)(?=_|\b)", lambda m: m[1] + rename.get(m[2], m[2]), text)
@@ -50,10 +50,12 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     moved = redirected(model, driven)
     own = [(e, bench.places[t.form.index]) for t in forces for e in bench.model.elements if e.name in t.elements]
     grown = extend(model, [e for e, _ in own], {}, [place for _, place in own])
-    limits = {t.form.index: values[t.free[0].target] for t in terms if t.form.how == "clip"}
+    limits = {t.form.index: [values[f.target] for f in t.free] for t in terms if t.form.how == "clip"}
     texts = [driven.through(named(s.expression)) for s in grown.sensors]
     delays = {t.form.index: fit.value(t.free[0].target) for t in terms if t.form.how == "late"}
-    delays = {j: d for j, d in delays.items() if d > late.SHORT * model.sample_time}
+    room = model.filter is None  # whose states a file lists, with how sure each is at the start
+    driven.left += [] if room else [_uncorrected(t) for t in terms if t.form.how == "late"]
+    delays = {j: d for j, d in delays.items() if room and d > late.SHORT * model.sample_time}
     sensors = [_sensor(model, j, text, values, offsets, limits, delays, driven) for j, text in enumerate(texts)]
     units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity
     outputs = [
@@ -62,7 +64,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
         if x and s.name in units_of
     ]
     outputs += [x for x in moved["outputs"] if x.split(" = ")[0] not in {o.split(" = ")[0] for o in outputs}]
-    substeps = max((late.substeps(d, 0.0, model.sample_time) for d in delays.values()), default=1)
+    substeps = max((late.substeps(d, model.sample_time) for d in delays.values()), default=1)
     lines = _head(model, terms, substeps)
     for title, entries in (
         ("parameters", [*parameters, *driven.parameters]),
@@ -146,7 +148,7 @@ def _sensor(
     expression: str,
     values: dict[str, float],
     offsets: Collection[str],
-    limits: Mapping[int, float],
+    limits: Mapping[int, Sequence[float]],
     delays: Mapping[int, float],
     driven: Driven,
 ) -> dict[str, object]:
@@ -169,8 +171,8 @@ def _sensor(
     if s.name in offsets:
         expression = f"{expression} + {added('bias', values[bias(s.name)], unit)}"
     if j in limits:
-        most = added("limit", limits[j], unit)
-        expression = f"min(max({expression}, -{most}), {most})"
+        most, *sharp = (added(stem, x, own) for x, stem, own in zip(limits[j], ("limit", "sharpness"), (unit, "1"), strict=False))
+        expression = clipping.expression(expression, most, *sharp)
     if expression == s.expression:
         return {}
     return {"value": expression, "unit": s.unit}

@@ -21,34 +21,52 @@ from .fit import Free
 Array = NDArray[np.float64]
 KIND = "sensor_clipping"
 SHARES = (0.98, 0.94, 0.88, 0.8, 0.7)  # quantiles of abs(y) that are tried as limits
+SOFT = "soft"  # note on a form that comes near its limit smoothly
+SOFT_TOPS = (1.05, 1.2, 2.0, 4.0)  # where that is, in the largest sample
+TINY = 1e-9  # of the limit, which has a logarithm
+SHARP = 2.0  # its exponent at first: 1 and more, a limit that cuts off where it is large
+TOPS = (1.05, 1.2)  # and shares of the largest sample: a sensor that saturates softly shows none at its limit
 
 
-def propose(bench: Bench, index: int, seen: Sequence[Array]) -> tuple[Score, Form] | None:
-    """The limit that gains most for a sensor; None for one that was not measured, or hardly moves. A free run, `seen` [n, n_z] for each
-    recording, replaces the signal that is not cut off; the part beyond a limit is the change of the innovations. Before any
-    form is accepted, and if the largest 2 % of the samples agree within three standard deviations of noise, limits are also tried with the
-    nominal parameters."""
+def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score, Form]]:
+    """The limit that gains most for a sensor, and the soft one that does; none for one that was not measured, or hardly moves. A free run,
+    `seen` [n, n_z] for each recording, replaces the signal that is not cut off; the part beyond a limit is the change of the innovations.
+    Before any form is accepted, and if the largest 2 % of the samples agree within three standard deviations of noise, limits are tried
+    with the nominal parameters too."""
     y = np.abs(np.concatenate([r.y[:, index] for r in bench.records]))
     y = y[np.isfinite(y)]
-    limits = [float(x) for x in np.quantile(y, SHARES) if x > 0.0] if y.size else []
-    if not limits:
-        return None
-    changes = []
-    for limit in limits:
-        change = np.zeros_like(bench.fit.nu)
-        change[:, index] = _means(bench.update, [z[:, index] - np.clip(z[:, index], -limit, limit) for z in seen])
-        changes.append(change)
-    gains = [s.gain for s in as_they_are(bench.fit, changes)]
+    if not np.any(y > 0.0):
+        return []
+    limits = [float(x) for x in (*np.quantile(y, SHARES), *(top * np.max(y) for top in TOPS)) if x > 0.0]
+
+    def gained(sizes: Sequence[float], sharp: float) -> list[float]:
+        changes = []
+        for limit in sizes:
+            change = np.zeros_like(bench.fit.nu)
+            change[:, index] = _means(bench.update, [z[:, index] - _cut(z[:, index], limit, sharp) for z in seen])
+            changes.append(change)
+        return [s.gain for s in as_they_are(bench.fit, changes)]
+
+    gains, soft = gained(limits, np.inf), [top * float(np.max(y)) for top in SOFT_TOPS]
     if len(bench.nominal) == len(bench.fit.free) and np.quantile(y, 0.998) - np.quantile(y, SHARES[0]) < 3.0 * bench.noise[index]:
         gains = [max(pair) for pair in zip(gains, _gains_of_nominal(bench, index, limits), strict=True)]
-    best = int(np.argmax(gains))
-    return Score(gains[best], np.ones(1)), Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[best])
+    found = []
+    for each, sizes, note in ((gains, limits, ""), (gained(soft, SHARP), soft, SOFT)):
+        best = int(np.argmax(each))
+        form = Form(KIND, bench.model.sensors[index].name, "clip", index, note=note, limit=sizes[best])
+        found.append((Score(each[best], np.ones(1 + bool(note))), form))
+    return found
+
+
+def _cut(x: Array, limit: float, sharp: float) -> Array:
+    """A signal behind a limit; `sharp`: infinite for one that cuts off."""
+    return np.clip(x, -limit, limit) if np.isinf(sharp) else x / (1.0 + np.abs(x / limit) ** sharp) ** (1.0 / sharp)
 
 
 def _gains_of_nominal(bench: Bench, index: int, limits: Sequence[float]) -> list[float]:
     """Log likelihood gained by each limit of a sensor with nominal parameters: those fitted to clipped data give too little motion."""
     form = Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[0])
-    model, limit = limited(bench.model, form, "x0_0_limit")
+    model, (limit,) = limited(bench.model, form, "x0_0")
     problem, free = bench.problem(model), (*bench.nominal, limit)
     shifts = np.zeros((len(limits), len(free)))
     shifts[:, -1] = np.log(np.array(limits) / limits[0])
@@ -56,21 +74,32 @@ def _gains_of_nominal(bench: Bench, index: int, limits: Sequence[float]) -> list
     return [likelihood(n, np.isfinite(n), problem.floor)[1] - bench.fit.likelihood for n in nu]
 
 
-def limited(model: Model, form: Form, name: str) -> tuple[Model, Free]:
-    """The model with a limit of a sensor, as a parameter `name` so large that it has no effect, and the free value for it."""
-    s = model.sensors[form.index]
-    cut = replace(s, expression=f"min(max({s.expression}, -{name}), {name})")
+def limited(model: Model, form: Form, stem: str) -> tuple[Model, tuple[Free, ...]]:
+    """The model with a limit of a sensor, as a parameter of this `stem` so large that it has no effect, and its free values: the limit, and
+    how sharp a soft one is."""
+    s, name, sharp = model.sensors[form.index], f"{stem}_limit", f"{stem}_sharp"
+    cut = replace(s, expression=expression(s.expression, name, sharp if form.note else ""))
     sensors = (*model.sensors[: form.index], cut, *model.sensors[form.index + 1 :])
     parameters = {**model.parameters, name: Parameter(name, FAR**2 * form.limit, s.unit)}
-    free = Free(name, form.limit, form.limit, log=True, sigma=1.0, origin=form.limit)
-    return replace(model, parameters=parameters, sensors=sensors), free
+    free = [Free(name, form.limit, form.limit, log=True, sigma=1.0, origin=form.limit)]
+    if form.note:
+        parameters[sharp] = Parameter(sharp, SHARP, "1")
+        free.append(Free(sharp, SHARP, SHARP, log=True, sigma=1.0, origin=SHARP, low=1.0))
+    return replace(model, parameters=parameters, sensors=sensors), tuple(free)
 
 
-def share(bench: Bench, form: Form, limit: Free) -> float:
+def expression(signal: str, limit: str, sharp: str = "") -> str:
+    """A signal behind a limit: one that cuts off, or a soft one that is so `sharp`."""
+    if sharp:
+        return f"({signal})*exp(-softplus({sharp}*log(abs({signal})/{limit} + {TINY}))/{sharp})"
+    return f"min(max({signal}, -{limit}), {limit})"
+
+
+def share(bench: Bench, form: Form, limit: Free, sharp: float = np.inf) -> float:
     """What a limit cuts off, as a share of the signal."""
     whole = tuple(replace(f, value=FAR**2 * f.value) if f.target == limit.target else f for f in bench.fit.free)
     z = np.concatenate([x[:, form.index] for x in bench.problem().predictor.sensors(whole)])
-    return float(np.sqrt(np.mean((z - np.clip(z, -limit.value, limit.value)) ** 2)) / max(np.std(z), 1e-300))
+    return float(np.sqrt(np.mean((z - _cut(z, limit.value, sharp)) ** 2)) / max(np.std(z), 1e-300))
 
 
 def _means(update: int, signals: Sequence[Array]) -> Array:

@@ -62,7 +62,7 @@ def settled(
         return smooth[0], smooth[1], [f"{what}taken as smooth, because the model uses an input's rate"]
     held = [[experiment(m, model) for m in ms] for ms in (train, holdout)]
     study, lead = _led(model, held[0], set_name)
-    other = begin(model, smooth[0], set_name)[0]
+    other = begin(model, smooth[0], set_name)
     better = loss(other, other.null) - loss(study, study.null)
     margin = f"by {abs(better):.3g} of -2 ln(likelihood) of the sensors"
     if better < 0.0:
@@ -76,12 +76,12 @@ def _led(model: Model, experiments: Sequence[Experiment], set_name: str) -> tupl
     """The study of the experiments with the lead of their steps, in samples, with which the model fits best."""
     lead, near = 0.5, 0.1  # anywhere between two rows, at first; a parabola goes through the costs that far to either side
     for _ in range(2):
-        study = begin(model, [_ahead(e, lead) for e in experiments], set_name)[0]
+        study = begin(model, [_ahead(e, lead) for e in experiments], set_name)
         before, here, after = (_cost(study, lead + d) for d in (-near, 0.0, near))
         bend = before - 2.0 * here + after
         move = 0.5 * near * (before - after) / bend if bend > 0.0 else np.sign(before - after)
         lead = float(np.clip(lead + move, 0.0, 1.0))
-    return begin(model, [_ahead(e, lead) for e in experiments], set_name)[0], lead
+    return begin(model, [_ahead(e, lead) for e in experiments], set_name), lead
 
 
 def _cost(study: Study, lead: float) -> float:

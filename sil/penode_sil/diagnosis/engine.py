@@ -19,22 +19,21 @@ from penode_gen.model import Model
 
 from ..errors import RecordingError
 from ..recordings.measured import Measured, with_shared_rails
-from . import dropouts, plausible, search, verdict
+from . import dropouts, plausible, verdict
 from .advice import advised
 from .broken import broken_sensors, still_broken
-from .by_noise import SEARCH, by_noise, judge_explanations
 from .checks import channels as mix_ups, differing, final
 from .checks.case import Case, End
 from .driven import settled
 from .evidence.bench import with_tolerances
+from .fit import Fit
 from .input_noise import with_noise_of_inputs
 from .noise import Experiment
-from .resting import resting
-from .result import Diagnosis, Recorded
+from .result import Cause, Diagnosis, Recorded
 from .study import Study, begin, guessed
-from .unmodelled import UNMODELLED, unmodelled
 from .worth import WORTH
 
+SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 AGAIN = 3  # times that bursts are looked for in what is left without them
 
 
@@ -64,47 +63,25 @@ def diagnose(
         if problems := plausible.misfits(with_tolerances(model), [*experiments, *unused], set_name):
             raise RecordingError(*problems)
         case = Case(model, nominal, train, holdout, unused, [*noisy, *remarks], Path(folder), log, tell, channels)
-        study, other, bursts = unburst(with_tolerances(model), experiments, set_name)
-        end = differing.different(case, study) or _searched(case, study, other, bursts)
+        study, bursts = unburst(with_tolerances(model), experiments, set_name)
+        searched = cache(lambda: _searched(case, study, bursts))
+        end = differing.different(case, study, searched) or searched()
         answer = final.checked(case, end, mixes)
     return advised(replace(answer, data=_recorded(train, holdout), seconds=time.perf_counter() - started), nominal)
 
 
-def _searched(case: Case, study: Study, other: Study, bursts: list[NDArray[np.bool_]]) -> End:
-    """The end of the search in samples, beside sensor noise, if what it finds leaves no unmodelled force; else that of the search by
-    innovations, which is also the answer where a rule of the final check withdraws all names. If the best single cause leaves a large
-    unmodelled force, innovations are asked first, and answer if one remains beside all that they find; if not, samples are searched for as
-    long as more causes leave less. Where neither explains what is left, and that is little, a network without a name may (by_noise)."""
+def _searched(case: Case, study: Study, bursts: list[NDArray[np.bool_]]) -> End:
+    """The end of the search, with sensors that clip or drop out by their samples; where no motion is about right, these show no faults."""
     faults = broken_sensors(study.model, case.train, study, study.null.simulated, bursts)
-    followed = verdict.supports(study.model)
-    ask = cache(lambda: verdict.searched(case, study))
-
-    def by_innovations(known: bool = True) -> End:
-        return verdict.conclude(case, study, ask(), lambda fit: still_broken(case.train, study, fit, faults, bursts) if known else ())
-
-    if followed and (guessed(study.model) or (not study.model.inputs and unmodelled(study, study.null, case.log) > 0.0)):
-        return by_innovations(False)  # no motion is about right: samples show neither causes nor faults
     case.tell(SEARCH[0], "looking for causes")
-    found, beam = search.first(study, case.log)
-    wrong = followed and bool(beam) and unmodelled(found, beam[0].fit, case.log) > UNMODELLED
-    if wrong:
-        end = by_innovations()
-        if end.answer.verdict == "explained" and UNMODELLED < ask().found.bench.level.size < 2.0 * WORTH:
-            return end
-    found, explanations = search.grow(
-        found, beam, case.log, hopeless=lambda study, e: wrong and unmodelled(study, e.fit, case.log) > UNMODELLED
-    )
-    found, explanations = resting(other, found, explanations, case.log)
-    best = explanations[0] if explanations else None
-    beside = unmodelled(found, best.fit if best else found.null, case.log) if followed else 0.0
-    if beside > 0.0 and ((end := by_innovations()).answer.verdict != "unexplained" or beside > UNMODELLED):
-        return end
-    found, judged = judge_explanations(case, found, explanations, faults, bursts)
-    nothing = judged.verdict == "unexplained" and not (judged.doubt or judged.drift)  # of another plant, or of clocks, samples tell more
-    if followed and not beside and nothing and (end := by_innovations()).answer.verdict != "unexplained":
-        return end
-    end = by_noise(case, found, best, judged)
-    return replace(end, other=by_innovations) if followed and end.answer.verdict != "unexplained" else end
+    found = verdict.searched(case, study)
+    free = not study.model.inputs and found.found.bench.level.size > 0.0
+    wrong = bool(guessed(study.model)) or free or found.found.level > WORTH
+
+    def broken(fit: Fit) -> Sequence[Cause]:
+        return () if wrong else still_broken(case.train, study, fit, faults, bursts)
+
+    return verdict.conclude(case, study, found, broken)
 
 
 def _recorded(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[Recorded, ...]:
@@ -112,18 +89,17 @@ def _recorded(train: Sequence[Measured], holdout: Sequence[Measured]) -> tuple[R
     return tuple(Recorded.of(m, role) for role, ms in (("training", train), ("hold-out", holdout)) for m in ms)
 
 
-def unburst(model: Model, experiments: Sequence[Experiment], set_name: str) -> tuple[Study, Study, list[NDArray[np.bool_]]]:
-    """The two studies of `begin` without bursts of samples that are far out, and these bursts: a fit that they have misled does not show
-    all of them."""
-    study, other = begin(model, experiments, set_name)
+def unburst(model: Model, experiments: Sequence[Experiment], set_name: str) -> tuple[Study, list[NDArray[np.bool_]]]:
+    """The study without bursts of samples that are far out, and these bursts: a fit that they have misled does not show all of them."""
+    study = begin(model, experiments, set_name)
     bursts = more = dropouts.bursts(study.experiments, study.null.simulated)
     for _ in range(AGAIN):
         if not any(b.any() for b in more):
             break
-        study, other = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, more, strict=True)], set_name)
+        study = begin(model, [replace(e, good=e.good & ~b) for e, b in zip(study.experiments, more, strict=True)], set_name)
         more = dropouts.bursts(study.experiments, study.null.simulated)
         bursts = [b | m for b, m in zip(bursts, more, strict=True)]
-    return study, other, bursts
+    return study, bursts
 
 
 def advancing(log: Callable[[str], None], tell: Callable[[float, str], None]) -> Callable[[str], None]:

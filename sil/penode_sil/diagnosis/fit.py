@@ -7,7 +7,7 @@ An iteration tries several steps at once, one in each lane (see batch), and so s
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -20,8 +20,6 @@ from penode_gen.model import Model
 
 from .between import CLOSE, joined, parts
 from .compiling import compiled, folded, longest, moving, ordered
-from .faulty import delayed, drifted, railed
-from .hypotheses import Fault
 from .noise import Experiment, Metric, Thinning, thinning
 from .plant import anonymous
 
@@ -29,16 +27,14 @@ Array = NDArray[np.float64]
 KEPT = 32  # experiments of which spectra and inputs are kept
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
 FAR = 1e20  # residual of a run that cannot be simulated, and the most that it shows
-REFRESHED = 3  # iteration at which derivatives taken as known are computed after all
 PROMISE = 0.7  # of the gain that a full step predicts: if that is reached, the derivatives have hardly changed
 DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
 
 
 @dataclass(frozen=True)
 class Free:
-    """Something to be fitted. `target`: a parameter's name, or ("bias" | "scale" | "delay" | "roll_off" | "rail" | "sharpness" | "skew",
-    sensor index), ("fault", its number), ("start", recording, state index), or ("own", recording, parameter). `unit` steps of it are
-    natural; a `log` one stays positive. `sigma`: its prior."""
+    """Something to be fitted. `target`: a parameter's name, or ("bias" | "skew", sensor index), ("start", recording, state index), or
+    ("own", recording, parameter). `unit` steps of it are natural; a `log` one stays positive. `sigma`: its prior."""
 
     target: str | tuple[str, int] | tuple[str, int, int] | tuple[str, int, str]
     value: float
@@ -67,7 +63,7 @@ class Free:
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Where a fit ended: chi2 with and without priors, whitened residual, and its derivatives [rows, free] in the units of
-    `free`; `whole`: all of these are as they are there; `metrics`: by which residual and derivatives are white."""
+    `free`."""
 
     model: Model
     free: tuple[Free, ...]
@@ -76,9 +72,6 @@ class Fit:
     residual: Array
     jacobian: Array
     simulated: tuple[Array, ...]
-    faults: tuple[Fault, ...] = ()
-    whole: bool = False
-    metrics: Sequence[Metric] = ()
 
     def value(self, target: object) -> float:
         return next(f.value for f in self.free if f.target == target)
@@ -114,32 +107,23 @@ class Fit:
         chi2 = float(residual @ residual)
         size = float(weight @ way)
         jacobian = self.jacobian + np.outer(missed, weight / size) if size > 0.0 else self.jacobian  # what nothing shows stays
-        return replace(
-            self, free=free, chi2=chi2, cost=chi2 + float(sum(f.offset**2 for f in free)), residual=residual, jacobian=jacobian, whole=False
-        )
+        return replace(self, free=free, chi2=chi2, cost=chi2 + float(sum(f.offset**2 for f in free)), residual=residual, jacobian=jacobian)
 
 
 class Problem:
     """A model against recordings in their metrics."""
 
     def __init__(
-        self,
-        model: Model,
-        experiments: Sequence[Experiment],
-        metrics: Sequence[Metric],
-        set_name: str = "default",
-        fastest: float = 0.0,
-        faults: Sequence[Fault] = (),
-        rough: bool = False,
+        self, model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], set_name: str = "default", fastest: float = 0.0
     ):
         self.model, self.experiments, self.metrics, self.set_name = model, experiments, metrics, set_name
-        self.faults, self.fastest = faults, fastest
+        self.fastest = fastest
         self.moving = moving(model)
         close = model.sample_time <= CLOSE and all(e.held is None for e in experiments)
         self.fine = 1 if close else 3 if self.moving else 2  # see _drive
         step = model.sample_time / self.fine
-        least = max(longest(model), CLOSE if rough else 0.0)
-        substeps = max(1, int(np.ceil(step * fastest / 0.1)), int(np.ceil(step / least - 1e-6)), -(-model.substeps // self.fine))
+        least = int(np.ceil(step / longest(model) - 1e-6))
+        substeps = max(1, int(np.ceil(step * fastest / 0.1)), least, -(-model.substeps // self.fine))
         way = ("cubic" if self.moving else "parabola") if close else "linear"
         exact = replace(folded(model), method="rk4", interpolation=way, substeps=substeps, sample_time=step)
         self.batch = compiled(anonymous(exact), ordered(model)[0])
@@ -154,34 +138,20 @@ class Problem:
         in half of the time."""
         return self._half() if 2.0 * self.model.sample_time <= longest(self.model) else None
 
-    @cached_property
-    def rough(self) -> Problem | None:
-        """The same in longer steps than its laws allow: they lead near to the best values in less than half of the time, or there are
-        none."""
-        exact = self.halved or self
-        found = self._half(True) or Problem(self.model, self.experiments, self.metrics, self.set_name, self.fastest, self.faults, True)
-        return found if 2 * found.steps <= exact.steps else None
-
-    @property
-    def steps(self) -> int:
-        """Steps of one simulation of all recordings."""
-        return sum(len(u) for u in self.inputs) * self.batch.model.substeps
-
-    def _half(self, rough: bool = False) -> Problem | None:
+    def _half(self) -> Problem | None:
         twice = 2.0 * self.model.sample_time
         even = self.model.fits(twice) and all(e.good.all() and len(e.time) % 2 == 0 and e.held is None for e in self.experiments)
         if not even or twice > CLOSE * (1.0 + 1e-9):
             return None
-        faults = [replace(f, series=tuple(x[::2] for x in f.series)) for f in self.faults]
         halves = [_halved(e) for e in self.experiments]
         metrics = [replace(m, n=m.n // 2, root=2.0 * m.root) for m in self.metrics]
-        return Problem(replace(self.model, sample_time=twice), halves, metrics, self.set_name, self.fastest, faults, rough)
+        return Problem(replace(self.model, sample_time=twice), halves, metrics, self.set_name, self.fastest)
 
     def _doubled(self, fit: Fit) -> Fit:
         """A fit of every second sample as one of all."""
         signals = zip(self.experiments, fit.simulated, strict=True)
         whole = tuple(CubicSpline(e.time[::2], z)(e.time) for e, z in signals)
-        return replace(fit, model=self.model, faults=tuple(self.faults), simulated=whole, metrics=self.metrics)
+        return replace(fit, model=self.model, simulated=whole)
 
     def simulate(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array]:
         """Sensors [runs, n, n_z] and named states of recording e for shifts [runs, free]."""
@@ -197,7 +167,7 @@ class Problem:
     def sensors(self, e: int, free: Sequence[Free], shifts: Array, states: Sequence[str] = ()) -> tuple[Array, Array, Array]:
         """The same as they lie in memory, [n, n_z, runs], but for skews [n_z, runs] whose rates are still to be taken away."""
         start = np.tile(np.array(self.model.start, dtype=float), (len(shifts), 1))
-        parameters, faults = {}, []
+        parameters, of_sensors = {}, []
         for f, shift in zip(free, shifts.T, strict=True):
             values = f.at(shift)
             if isinstance(f.target, str) or f.of("own", e):
@@ -205,7 +175,7 @@ class Problem:
             elif f.of("start", e):
                 start[:, f.target[2]] = values
             elif f.target[0] not in ("start", "own"):  # of another recording
-                faults.append((f.target[0], f.target[1], values))
+                of_sensors.append((f.target[0], f.target[1], values))
         run = self.batch.run(self.inputs[e], x0=start, parameters=parameters, set_name=self.set_name, states=states, every=self.fine)
         z = run.z.transpose(1, 2, 0)  # [n, n_z, runs], as they lie in memory
         if self.moving and self.fine == 1 and len(z) > 4:
@@ -215,26 +185,11 @@ class Problem:
             z[0] = 2.0 * z[1] - z[2]
         z[:, :, run.first_bad >= 0] = 1e30
         skews = np.zeros(z.shape[1:])
-        companions = {(what, j): values for what, j, values in faults if what in ("roll_off", "sharpness")}
-        plain: dict[int, Array] = {}  # [n, runs], of sensors with faults
-        for what, j, values in faults:
-            if what == "fault":
-                fault = self.faults[j]
-                signal = plain.setdefault(fault.sensor, z[:, fault.sensor].copy())
-                z[:, fault.sensor] += (values[:, None] * fault.of(signal.T, e)).T
-            elif what == "scale":
-                z[:, j] *= 1.0 + values
-            elif what == "bias":
+        for what, j, values in of_sensors:
+            if what == "bias":
                 z[:, j] += values
-            elif what == "skew":
+            else:
                 skews[j] = values
-            elif what == "clock":
-                z = drifted(z, values)
-            elif what == "delay":
-                z[:, j] = delayed(z[:, j], values, companions.get(("roll_off", j), np.zeros(len(shifts))), self.experiments[e].step)
-        for what, j, values in faults:
-            if what == "rail":  # after all else that a sensor does
-                z[:, j] = railed(z[:, j], values, companions["sharpness", j])
         return z, skews, run.x
 
     def residuals(self, e: int, z: Array, skews: Array) -> Array:
@@ -252,19 +207,18 @@ class Problem:
             white[~(np.sum(np.abs(white), axis=1) < FAR)] = FAR
         return white
 
-    def solve(self, free: Sequence[Free], iterations: int = 12, close: float = 0.05, known: Mapping[int, Array] = {}) -> Fit:
+    def solve(self, free: Sequence[Free], iterations: int = 12, close: float = 0.05) -> Fit:
         """The best free values from those given on, by damped Gauss-Newton; stops where a step gains less than `close`, or promises to.
-        `known` derivatives (by number) are near enough and are not simulated: see `complete`.
 
         The full step and three of the dampings around that of the step before are tried at once, then the others if none of these gains.
         After a full step that kept its promise, derivatives are not simulated but go on from those of before (see `secant`); a fit does
         not end with such.
         """
         if self.halved is not None:
-            return self._doubled(self.halved.solve(free, iterations, close, known))
-        known, fresh, damping = dict(known), True, len(DAMPING) // 2
-        fit = self.at(tuple(free), known)
-        for k in range(1, iterations + 1):
+            return self._doubled(self.halved.solve(free, iterations, close))
+        fresh, damping = True, len(DAMPING) // 2
+        fit = self.at(tuple(free))
+        for _ in range(iterations):
             trials, promised = fit.steps()
             ended = not np.isfinite(fit.cost) or promised < close
             near = min(max(damping - 1, 1), len(DAMPING) - 3)
@@ -279,16 +233,12 @@ class Problem:
             if ended and fresh:
                 break
             if ended:
-                fit, fresh = self.at(fit.free, known), True
+                fit, fresh = self.at(fit.free), True
                 continue
             there = _put(fit.free, moved[:, best])
-            fresh = damping > 0 or gained < PROMISE * promised or k == REFRESHED
-            if fresh:
-                fit = self.at(there, {} if k == REFRESHED else known)
-                known = {i: fit.jacobian[:, i] for i in known}
-            else:
-                fit = fit.secant(there, residuals[best])
-        return fit if fresh else self.at(fit.free, known)
+            fresh = damping > 0 or gained < PROMISE * promised
+            fit = self.at(there) if fresh else fit.secant(there, residuals[best])
+        return fit if fresh else self.at(fit.free)
 
     def _tried(self, free: Sequence[Free], steps: Array) -> tuple[Array, Array, Array]:
         """Residuals [steps, rows], values [free, steps] and costs after steps [steps, free]."""
@@ -298,41 +248,18 @@ class Problem:
         costs = np.einsum("ij,ij->i", residuals, residuals) + np.sum(away**2, axis=0)
         return residuals, moved, np.where(np.isfinite(costs), costs, np.inf)
 
-    def at(self, free: tuple[Free, ...], known: Mapping[int, Array] = {}) -> Fit:
+    def at(self, free: tuple[Free, ...]) -> Fit:
         """The fit that ends at these free values."""
-        residual, jacobian, simulated = self.linear(free, known)
+        residual, jacobian, simulated = self.linear(free)
         chi2 = float(residual @ residual)
         cost = chi2 + float(sum(f.offset**2 for f in free))
-        return Fit(self.model, free, chi2, cost, residual, jacobian, simulated, tuple(self.faults), not known, self.metrics)
+        return Fit(self.model, free, chi2, cost, residual, jacobian, simulated)
 
-    def eased(self, free: Sequence[Free]) -> tuple[Free, ...]:
-        """The free values with all gains of laws scaled down as far as the simulation starts best: a regression that
-        looked at small motions may ask for too much."""
-        if self.halved is not None:
-            return self.halved.eased(free)
-        gains = np.array([isinstance(f.target, str) and not f.log and f.sigma == np.inf and f.origin == 0.0 for f in free])
-        if not gains.any():
-            return tuple(free)
-        shares = np.array([1.0, 0.7, 0.5, 0.3, 0.15, 0.07, 0.03, 0.0])
-        shifts = np.outer(shares - 1.0, np.where(gains, [f.value / f.unit for f in free], 0.0))
-        costs = np.zeros(len(shares))
-        for e in range(len(self.experiments)):
-            r = self.residuals(e, *self.sensors(e, free, shifts)[:2])
-            costs += np.einsum("ij,ij->i", r, r)
-        best = int(np.argmin(np.where(np.isfinite(costs[:-1]), costs[:-1], np.inf)))
-        return _put(free, np.array([f.at(shift) for f, shift in zip(free, shifts[best], strict=True)]))
-
-    def complete(self, fit: Fit) -> Fit:
-        """The fit with all of its derivatives as they are where it ended."""
-        if fit.whole:
-            return fit
-        return replace(fit, jacobian=(self.halved or self).linear(fit.free)[1], whole=True)
-
-    def linear(self, free: Sequence[Free], known: Mapping[int, Array] = {}) -> tuple[Array, Array, tuple[Array, ...]]:
+    def linear(self, free: Sequence[Free]) -> tuple[Array, Array, tuple[Array, ...]]:
         """Whitened residual [rows], minus its derivatives [rows, free], and the sensors simulated, at the free values."""
         blocks, rows, simulated = [], [], []
         for e in range(len(self.experiments)):
-            own = [i for i, f in enumerate(free) if i not in known and not (f.target[0] in ("start", "own") and f.target[1] != e)]
+            own = [i for i, f in enumerate(free) if not (f.target[0] in ("start", "own") and f.target[1] != e)]
             step = 1e-3
             lanes = self.batch.lanes
             shifts = np.zeros((-(-(len(own) + 1) // lanes) * lanes, len(free)))  # whole vectors lie closely in memory
@@ -347,10 +274,7 @@ class Problem:
             rows.append(r[0])
             bounded = np.clip(z[:, :, :1], -FAR, FAR)
             simulated.append(bounded[:, :, 0] - self.rates(e, bounded)[:, :, 0] * skews[:, 0])
-        jacobian = np.concatenate(blocks, axis=1).T
-        for i, column in known.items():
-            jacobian[:, i] = column
-        return np.concatenate(rows), jacobian, tuple(simulated)
+        return np.concatenate(rows), np.concatenate(blocks, axis=1).T, tuple(simulated)
 
 
 @lru_cache(maxsize=KEPT)

@@ -14,8 +14,8 @@ from .evidence.blocks import Blocks
 from .evidence.fit import Fit
 from .evidence.observer import Filter, bias
 from .propose import FREE_RUN
-from .reconsider import reconsidered
-from .rounds import LEVEL_FACTORS, Accepted, Grown, Rounds, is_large, name_of, terms_of
+from .reconsider import centred, reconsidered
+from .rounds import LEVEL_FACTORS, MIN_FORM, Accepted, Grown, Rounds, is_large, name_of, terms_of
 from .terms import Term
 from .worth import Z_95, least, mostly, remaining
 
@@ -59,20 +59,34 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         stiffer = replace(rounds, stiffer=LEVEL_FACTORS[1])
         again = reconsidered(stiffer, stiffer.grow())
         rounds, end = (stiffer, again) if any(again.large) else (rounds, end)
+    end = centred(rounds, end)
     after, sensors = end.bench, [bias(s.name) for s in bench.model.sensors]
     none = [b for b in sensors if abs(after.fit.value(b)) <= Z_95 * after.fit.deviation(b)]
     run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 2 * FREE_RUN)
     level = remaining(after, run, np.array([s.noise for s in bench.model.sensors]))
     log(f"what remains: {level:.3g} of all forces")
     end = _run_free(end, level, log)
-    return _found(rounds, end, end.large, run, level)
+    return _found(rounds, end, _own_names(end), run, level)
+
+
+def _own_names(end: Grown) -> list[bool]:
+    """Which forms have a name: the large ones, but for one that gains less than MIN_FORM of what another does at its place, input or
+    sensor: the curve of that is not its textbook form, and the small one makes up for the difference."""
+    large = [a.trial for a, big in zip(end.accepted, end.large, strict=True) if big]
+    most = {t.form.at: max(o.gain for o in large if o.form.at == t.form.at) for t in large}
+    return [big and a.trial.gain >= MIN_FORM * most[a.trial.form.at] for a, big in zip(end.accepted, end.large, strict=True)]
 
 
 def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
     """The end of a search, with those forms large that have a name beside the unmodelled `level` that remains. One too small for that
-    counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it."""
+    counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it. Where
+    nothing remains, every force that held-out blocks require is large."""
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
-    accepted, large = list(end.accepted), [is_large(a.trial, least(level, a.trial.whole)) for a in end.accepted]
+    needed = [level == 0.0 and a.trial.form.how == "force" for a in end.accepted]
+    accepted, large = (
+        list(end.accepted),
+        [n or is_large(a.trial, least(level, a.trial.whole)) for n, a in zip(needed, end.accepted, strict=True)],
+    )
     if all(large):
         return replace(end, large=tuple(large))
     problem = bench.problem()

@@ -47,7 +47,7 @@ def _drove(model: Model, train: Sequence[Measured], set_name: str, shown: Mappin
     """Which share of the noise in the records of inputs drove the plant, as sensors show it, and its standard deviation: the regression of
     what they show beyond a simulation on what that noise does in one, both above the frequencies of the signal. What a model misses is
     slower, so it does not matter what is wrong with the model."""
-    study = begin(model, [experiment(r, model, smooth=True) for r in train], set_name)[0]
+    study = begin(model, [experiment(r, model, smooth=True) for r in train], set_name)
     free = study.null.free
     product = power = 0.0
     for r, e, z in zip(train, study.experiments, study.null.simulated, strict=True):

@@ -11,8 +11,8 @@ import numpy as np
 
 from .entries import table, toml
 
-SHORT = 0.02  # of a sample: shorter delays are no cause, and not written
-ONE_POLE = 0.48  # of a delay squared: beyond that the second pole of a filter is 50 times as fast as the first
+SHORT = 0.05  # of a sample: shorter delays are no cause, and not written: inputs between rows are not known that well
+STIFF, DRAG = 12, 6  # of its states
 
 
 @dataclass(frozen=True)
@@ -25,44 +25,18 @@ class Late:
     equations: tuple[str, ...]
 
 
-def written(expression: str, names: Sequence[str], unit: str, delay: float, roll_off: float = 0.0) -> Late:
-    """An expression in `unit`, delayed by `delay` [s]. `roll_off`: second-order attenuation, in units of delay^2 (see `poles`). `names`: of
-    the delay, the delayed signal, and its rate times the delay."""
+def written(expression: str, names: Sequence[str], unit: str, delay: float) -> Late:
+    """An expression in `unit`, delayed by `delay` [s]: Pade's fraction of order 2, u - rate with x*late = rate and x*rate = 12*(u - late)
+    - 6*rate, where x is s*delay. `names`: of the delay, the delayed signal, and its rate times the delay."""
     time, late, rate = names
-    stiff, drag, direct, own = poles(roll_off)
-    slope = rate if stiff else f"{expression} - {late}"
-    equations = [f"{late} = {toml(f'der({late})*{time} = {slope}')}"]
-    if stiff:
-        equations.append(f"{rate} = {toml(f'der({rate})*{time} = {stiff:.7g}*({expression} - {late}) - {drag:.7g}*{rate}')}")
-    states = tuple(f"{state} = {table({'unit': unit})}" for state in ((late, rate) if stiff else (late,)))
-    if direct == 1.0:
-        seen = f"{expression} - {rate}"
-    else:
-        seen = f"{late} + {direct:.7g}*({expression} - {late}) - {own:.7g}*{rate}" if direct else late
-    return Late(seen, f"{time} = {table({'value': delay, 'unit': 's'})}", states, tuple(equations))
+    equations = (
+        f"{late} = {toml(f'der({late})*{time} = {rate}')}",
+        f"{rate} = {toml(f'der({rate})*{time} = {STIFF}*({expression} - {late}) - {DRAG}*{rate}')}",
+    )
+    states = tuple(f"{state} = {table({'unit': unit})}" for state in (late, rate))
+    return Late(f"{expression} - {rate}", f"{time} = {table({'value': delay, 'unit': 's'})}", states, equations)
 
 
-def substeps(delay: float, roll_off: float, step: float) -> int:
-    """Substeps per sample of `step` [s] for which the fastest pole of a delay [s] times the substep is at most 1."""
-    return int(np.ceil(fastest(roll_off) * step / delay))
-
-
-def fastest(roll_off: float) -> float:
-    """The faster pole of a delay's states, or the one of one, times the delay."""
-    stiff, drag, _, _ = poles(roll_off)
-    return float(np.max(np.abs(np.roots([1.0, drag, stiff])))) if stiff else 1.0
-
-
-def poles(roll_off: float) -> tuple[float, float, float, float]:
-    """A delay with a roll-off (of its square, see faulty.delayed) in two states, x*late = rate and x*rate = stiff*(u - late) - drag*rate
-    with x = s*delay: late + direct*(u - late) - own*rate. Two poles are themselves; one of them alone (all 0: x*late = u - late) if
-    the other is far faster. With less roll-off, Pade's fraction of order 2 of exp(-x) (1 + roll_off x^2): 12, 6, 1, 1 without any."""
-    if roll_off > ONE_POLE:
-        return 0.0, 0.0, 0.0, 0.0
-    if roll_off > 1.0 / 6.0:
-        stiff = 1.0 / (0.5 - roll_off)
-        return stiff, stiff, 0.0, 0.0
-    x2, x3, x4 = 1.0 / 2.0 + roll_off, -1.0 / 6.0 - roll_off, 1.0 / 24.0 + roll_off / 2.0
-    d1, d2 = np.linalg.solve([[x2, -1.0], [x3, x2]], [-x3, -x4])
-    direct = (x2 - d1 + d2) / d2
-    return 1.0 / d2, d1 / d2, float(np.round(direct, 12)), 1.0 - d1 + direct * d1
+def substeps(delay: float, step: float) -> int:
+    """Substeps per sample of `step` [s] for which the poles of a delay [s] times the substep are at most 1."""
+    return int(np.ceil(np.sqrt(STIFF) * step / delay))

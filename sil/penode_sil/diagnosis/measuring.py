@@ -16,18 +16,18 @@ from penode_gen.model import Model
 from ..targets import Sil
 from . import stepped
 from .beginning import begins_at_rest, start_of
-from .build import SPREAD
 from .compiling import moving
 from .dropouts import bursts
 from .evidence.blocks import DRAWS
 from .fit import Free, Problem
-from .hypotheses import size
 from .noise import Experiment, metric
 from .residual import Channel, channels, noise_floor, noise_rms, rms
 from .result import Gain
+from .smoother import size
 from .study import Study, watched, widened
 
 Array = NDArray[np.float64]
+SPREAD = {"1": 0.5, "m": 0.01, "m/s": 0.05, "N": 1e-3, "s": 1e-3, "rad": 0.01, "rad/s": 0.05, "N*m": 1e-3}  # of start states of laws
 
 
 def started(model: Model, e: Experiment, study: Study) -> tuple[Array, Array]:
@@ -56,7 +56,7 @@ def deployed(model: Model, e: Experiment, start: Array, set_name: str) -> Array:
 
 
 def measure(
-    study: Study, extended: Model, holdout: Sequence[Experiment], lost: Collection[str] = (), set_name: str = ""
+    study: Study, extended: Model, holdout: Sequence[Experiment], set_name: str = "", lost: Collection[str] = ()
 ) -> tuple[dict[str, Gain], list[str], list[Channel]]:
     """Errors before and after on held-out recordings, with the generated C; which share of them lies outside of the range of
     the training, where a right name does not determine the size; and all of it sample by sample. Sensors `lost` have dropouts, which do not

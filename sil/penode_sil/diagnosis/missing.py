@@ -237,7 +237,7 @@ class _Recording:
                 held=None if e.held is None else np.append(e.held, False),
             )
         )
-        problem = Problem(acting or study.model, [driven], (), study.set_name, study.linear.fastest, study.null.faults)
+        problem = Problem(acting or study.model, [driven], (), study.set_name, study.linear.fastest)
         moves = np.vstack([np.zeros(len(free)), EFFORT.shift * np.eye(len(free))])
         z = problem.simulate(0, [replace(_of(f, k), low=-np.inf, high=np.inf) for f in free], moves)[0][:, :, list(own)] / sigma
         rest = e.y[:, list(own)] / sigma - z[0]

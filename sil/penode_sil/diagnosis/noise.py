@@ -275,9 +275,7 @@ def thinning(n: int, band: int) -> Thinning:
     return Thinning(n, every, taps, gain)
 
 
-def sensor_levels(
-    e: Experiment, residual: Array, declared: Array, through: NDArray[np.complex128], coloured: bool = True, robust: bool = True
-) -> Array:
+def sensor_levels(e: Experiment, residual: Array, declared: Array, through: NDArray[np.complex128], robust: bool = True) -> Array:
     """Noise variance per sample of each sensor over all frequencies of the band [f, sensors].
 
     What a sensor's record shows by itself, above the band of the signals, is continued below; a slow part is added as the
@@ -311,7 +309,7 @@ def sensor_levels(
         p, b, r = (np.add.reduceat(x[:band], edges) / bins for x in (power[:, j], base, road))
         whole = float(np.mean(base))
         room = max((1.25 * sigma) ** 2 if sigma > 0.0 else 4.0 * whole, 1.1 * whole) - whole
-        k, share = _slow_part(p, b + r, room, means, bins, robust) if coloured else (0, 0.0)
+        k, share = _slow_part(p, b + r, room, means, bins, robust)
         found[:, j] = base[:band] + share * room * shapes[k]
     return found
 
@@ -355,9 +353,9 @@ UNSEEN = 1.5  # times the noise: an error that no coloured noise of sensors expl
 ALIKE = 7.0  # standard deviations by which sensors may share a residual that is only noise
 
 
-def correlation(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> tuple[float, float]:
+def correlation(experiments: Sequence[Experiment], metrics: Sequence[Metric], simulated: Sequence[Array]) -> float:
     """How much the residuals of different sensors are alike, in standard deviations of that of independent noise, in that
-    part of the spectrum where they are most alike; and in all of it the chi-square beyond what such noise makes.
+    part of the spectrum where they are most alike.
 
     Noise of sensors has nothing in common (what the inputs' noise has, the metrics take out), so coherence between two of
     them is the mark of something that moves the plant. Over B bins, -2 (B - 1) log(1 - coherence) is chi-square of 2.
@@ -378,4 +376,4 @@ def correlation(experiments: Sequence[Experiment], metrics: Sequence[Metric], si
                         coherence = float(np.abs(s[i, j]) ** 2 / max(power[i] * power[j], 1e-300))
                         found[part] -= 2.0 * (len(band) - 1) * np.log1p(-min(coherence, 1.0 - 1e-12))
                         freedom[part] += 2.0
-    return float(np.max((found - freedom) / np.sqrt(2.0 * np.maximum(freedom, 1.0)))), float(np.sum(np.maximum(found - freedom, 0.0)))
+    return float(np.max((found - freedom) / np.sqrt(2.0 * np.maximum(freedom, 1.0))))

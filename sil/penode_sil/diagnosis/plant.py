@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,25 +39,21 @@ class Place:
     trained: tuple[tuple[str, str, float, float, bool], ...] = ()  # element, "s" or "v", range of its network, if it is stated
     turns: bool = False
     lacks: tuple[str, ...] = ()  # laws, of a spring and of a damper that are straight lines, that no element there has
+    damper: str = ""  # the first element that is a damper or a friction, if any is
 
     @property
     def name(self) -> str:
         """What a report calls it: its first element, or the body."""
         return self.elements[0][0] if self.elements else self.ends[0]
 
+    @property
+    def loss(self) -> str:
+        """What a report calls it where damping or friction is meant: the first element that is one, if any is."""
+        return self.damper or self.name
+
     def unit(self, of_length: str) -> str:
         """A unit of the force there: `of_length`, or the rotational one where the ends turn."""
         return laws.for_angles(of_length) if self.turns else of_length
-
-
-def nominal(model: Model, place: Place, law: str, argument: str, values: Mapping[object, float]) -> float:
-    """Sum of an argument of the linear elements of a place, with fitted values."""
-    total = 0.0
-    for e in model.elements:
-        if e.law == law and any(name == e.name for name, _ in place.elements):
-            name = e.arguments[argument]
-            total += values.get(name, model.parameters[name].value)
-    return total
 
 
 def places(model: Model, set_name: str = "default") -> tuple[Place, ...]:
@@ -75,10 +70,11 @@ def places(model: Model, set_name: str = "default") -> tuple[Place, ...]:
     for ends, elements in found.items():
         turns = mechanics.rotational(model, ends)
         tyre = bool(set(ends) & inputs) and bool(set(ends) & carried) and not turns
-        own = [e for e in model.elements if e.network and any(e.name == name for name, _ in elements)]
-        trained = tuple(entry for e in own for entry in _trained(model, e, set_name))
-        lacks = () if tyre else _lacking(model, [e for e in model.elements if any(e.name == name for name, _ in elements)])
-        result.append(Place(ends, tuple(elements), "tyre" if tyre else "force", trained, turns, lacks))
+        own = [e for e in model.elements if any(e.name == name for name, _ in elements)]
+        trained = tuple(entry for e in own if e.network for entry in _trained(model, e, set_name))
+        lacks = () if tyre else _lacking(model, own)
+        damper = next((e.name for e in own if _dissipates(model, e)), "")
+        result.append(Place(ends, tuple(elements), "tyre" if tyre else "force", trained, turns, lacks, damper))
     known = {frozenset(p.ends) for p in result}
     result += [Place((b.name, GROUND), (), "body", (), b.rotational) for b in model.bodies if frozenset((b.name, GROUND)) not in known]
     return tuple(result)
@@ -86,22 +82,35 @@ def places(model: Model, set_name: str = "default") -> tuple[Place, ...]:
 
 def _lacking(model: Model, elements: Sequence[Element]) -> tuple[str, ...]:
     """The laws of lines that none of the elements of a place has, nor an expression or a network that may be one."""
-    ways = {"linear_spring": {"s", *(b.position for b in model.bodies)}, "linear_damper": {"v", *(b.velocity for b in model.bodies)}}
-    words = {word for e in elements for word in re.findall(r"\w+", e.expression)}
-    words |= {word[0] for e in elements for word in words if word in (f"s_{e.name}", f"v_{e.name}")}
+    words = {word for e in elements if e.law not in laws.LAWS for word in _words(e)}
     learnt = any(e.network for e in elements)
-    return tuple(law for law, names in ways.items() if not learnt and not names & words and all(e.law != law for e in elements))
+    lines = zip(("linear_spring", "linear_damper"), _ways(model), strict=True)
+    return tuple(law for law, names in lines if not learnt and not names & words and all(e.law != law for e in elements))
+
+
+def _dissipates(model: Model, e: Element) -> bool:
+    """Is an element a damper or a friction: does its force depend on the rate of its ends, and not on their deflection?"""
+    deflections, rates = _ways(model)
+    words = _words(e)
+    return bool(words & rates) and not words & deflections
+
+
+def _ways(model: Model) -> tuple[set[str], set[str]]:
+    """What a law calls a deflection, and a rate."""
+    return {"s", *(b.position for b in model.bodies)}, {"v", *(b.velocity for b in model.bodies)}
+
+
+def _words(e: Element) -> set[str]:
+    """Names in the force of an element, s and v without that of the element."""
+    if e.network:
+        return {{"deflection": "s", "rate": "v"}.get(name, name) for name in e.network_inputs}
+    words = set(re.findall(r"\w+", laws.LAWS[e.law].force if e.law in laws.LAWS else e.expression))
+    return words | {word[0] for word in words if word in (f"s_{e.name}", f"v_{e.name}")}
 
 
 def placeless(found: Sequence[Place]) -> str:
     """A note on a model in which no force can be missing; empty for others."""
     return "" if found else "the model has no elements and no bodies: causes are looked for in its parameters and sensors"
-
-
-def in_place(found: dict[str, tuple[str, Any]], what: Any, at: Sequence[Place]) -> dict[str, tuple[str, Any]]:
-    """Parameters of a cause with the units of where it acts: a Basis at its place, or an absorber."""
-    place = getattr(what, "place", what[1] if isinstance(what, tuple) else None)
-    return found if place is None else {name: (at[place].unit(unit), value) for name, (unit, value) in found.items()}
 
 
 def moving_ends(model: Model) -> set[str]:
@@ -211,17 +220,6 @@ class Linear:
     @cached_property
     def _kept(self) -> dict[bytes, NDArray[np.complex128]]:
         return {}
-
-    def states(self, f: Array) -> NDArray[np.complex128]:
-        """Responses [f, x, places] of the states to forces at the places."""
-        jw = 2j * np.pi * f[:, None, None]
-        return np.linalg.solve(self._pencil(f), self.b + jw * self.b1)[:, :, self.n_inputs :]
-
-    def free(self, f: Array, rate: float) -> NDArray[np.complex128]:
-        """Spectra [f, y, x] of the responses to start states, sampled with `rate` [Hz]."""
-        if not len(self.a):
-            return np.zeros((len(f), len(self.c), 0), dtype=complex)
-        return rate * (self.c @ np.linalg.inv(self._pencil(f)))
 
     def _pencil(self, f: Array) -> NDArray[np.complex128]:
         n = len(self.a)

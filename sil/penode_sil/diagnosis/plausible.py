@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from penode_gen import units
 from penode_gen.model import Model
 
-from .explanation import COST, NEW, Explanation, cost
 from .fit import Free, Problem
 from .noise import Experiment
 from .study import Study, guessed
@@ -91,24 +90,20 @@ def missed(study: Study) -> dict[str, float]:
     return found
 
 
-def doubt(study: Study, best: Explanation | None, verdict: str) -> str:
-    """What to say if the recordings are of another plant, or not of this model at all; empty if they may well be."""
+def doubt(study: Study) -> str:
+    """What to say of unexplained recordings if they are of another plant, or not of this model at all; empty if they may well be."""
     misses = missed(study)
-    if verdict == "no_discrepancy" or max(misses.values(), default=0.0) < POOR:
+    if max(misses.values(), default=0.0) < POOR:
         return ""
-    left = best.fit.cost - len(best.fit.residual) if best else 0.0
-    little = max(2.0 * NEW, 0.01 * (study.null.cost - best.fit.cost)) if best else 0.0
-    settled = best is not None and len(best.groups) == 1 and left < little
-    named = best.fit.cost + NEW * len(best.groups) + sum(cost(t.candidate) for t in best.terms) if best else np.inf
-    problem = "" if settled else other_plant(study, named if verdict != "unexplained" else np.inf)
-    if not problem and verdict == "unexplained" and max(misses.values()) > UNLIKE:
+    problem = other_plant(study)
+    if not problem and max(misses.values()) > UNLIKE:
         shares = ", ".join(f"{max(0.0, 1.0 - share):.0%} of {name}" for name, share in misses.items())
         problem = f"the model explains {shares}; check that the signals were recorded together, and with this plant"
     return problem
 
 
-def other_plant(study: Study, bound: float) -> str:
-    """What to say if other parameters all over the model leave less than `bound` with their freedom, and little."""
+def other_plant(study: Study) -> str:
+    """What to say if other parameters all over the model leave little."""
     parameters = {p.name: p for p in study.model.parameters.values() if p.tolerance > 0.0 and p.value > 0.0}
     free = [f for f in study.null.free if f.target not in parameters]
     free += [
@@ -120,7 +115,7 @@ def other_plant(study: Study, bound: float) -> str:
     ratios = {f.target: f.value / f.origin for f in fit.free if f.target in parameters}
     far = {k: r for k, r in ratios.items() if abs(np.log(r)) > max(FAR, 3.0 * parameters[k].tolerance)}
     rows = len(fit.residual)
-    if len(far) < 2 or fit.chi2 > min(bound - NEW - COST * len(ratios), rows + LITTLE * (study.null.chi2 - rows)):
+    if len(far) < 2 or fit.chi2 > rows + LITTLE * (study.null.chi2 - rows):
         return ""
     texts = ", ".join(f"{r:.2f} times its {k}" for k, r in far.items())
     return f"the data seem to be of another plant, with {texts}; name the model file of that plant"

@@ -14,13 +14,14 @@ from penode_gen.model import GROUND, Model
 
 from . import catalogue, clipping, holding
 from .catalogue import drives, friction
+from .catalogue.actuators import ACTUATORS
 from .catalogue.form import Form, Motion, Moved
 from .evidence.bench import Bench, fit_level
 from .evidence.fit import Fit
 from .evidence.observer import Filter, drives as drives_of, force_at
 from .evidence.screening import AT_ONCE, Probe, Score, as_they_are, scores
 from .fit import Free
-from .terms import Term, Trial, drive, free_of, moves, with_forms
+from .terms import Term, Trial, drive, free_of, moves, whole, with_forms
 from .worth import share
 
 Array = NDArray[np.float64]
@@ -41,8 +42,8 @@ def motions(probe: Probe) -> list[Motion]:
         first = 3 * len(bench.places)
         loads |= {f"F_{e.name}": first + i for i, e in enumerate(driving) if {*e.ends} & {*place.ends} - {GROUND}}
         parts = [
-            Moved(m[:, 3 * k], m[:, 3 * k + 1], np.arange(len(m)) * bench.step, {f: np.abs(m[:, i]) for f, i in loads.items()})
-            for m in probe.motions
+            Moved(m[:, 3 * k], m[:, 3 * k + 1], np.arange(len(m)) * bench.step, {f: np.abs(m[:, i]) for f, i in loads.items()}, r.left)
+            for m, r in zip(probe.motions, bench.records, strict=True)
         ]
         acts = float(np.std(np.concatenate([m[:, first + len(driving) + k] for m in probe.motions])))
         found.append(Motion.of(parts, acts if place.elements else _inertia(bench, place.ends[0])))
@@ -75,14 +76,15 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None], sti
     ranked = _screened(bench, probe, forms, moved)
     cut = {t.form.where for t in terms if t.form.how == "clip"}
     seen = bench.problem().predictor.sensors(bench.fit.free)
-    limits = [clipping.propose(bench, j, seen) for j, s in enumerate(bench.model.sensors) if s.name not in cut]
+    limits = [pair for j, s in enumerate(bench.model.sensors) if s.name not in cut for pair in clipping.propose(bench, j, seen)]
     actuators = [pair for j in moving for pair in _bent(bench, j, terms)]
-    ranked = sorted([*ranked, *filter(None, limits), *actuators], key=lambda pair: -pair[0].gain)
+    ranked = sorted([*ranked, *limits, *actuators], key=lambda pair: -pair[0].gain)
     chosen = _chosen(ranked)
     wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
     trials = [_fitted(bench, base, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen, strict=True)]
     trials += [_fitted(bench, base, wide, moved, terms, t, np.ones(1)) for t in _holds(bench, trials, terms)]
+    trials += _of_all(bench, base, trials, moved, terms)
     return sorted(trials, key=lambda t: -t.gain), wide
 
 
@@ -96,16 +98,21 @@ def _corrected_less(bench: Bench, stiffer: float) -> Bench:
 
 def _chosen(ranked: Sequence[tuple[Score, Form]]) -> list[tuple[Score, Form]]:
     """The forms that are fitted: of each kind, place and note the best; of these the TRIED with the largest gain beyond PROMISE for each of
-    their sizes, the best force of every place that is not among them, for small improvements where much acts would crowd out the cause
-    where little does, what is a part of one of them, and the best limit of every other input and sensor: little else does what they do."""
+    their sizes, no more than half of them of one curve at a place, the best force of every place that is not among them, for small
+    improvements where much acts would crowd out the cause where little does, what is a part of one of them, and the best limit of every
+    other input and sensor: little else does what they do."""
     best: dict[tuple[str, str, str], tuple[Score, Form]] = {}
     for score, form in ranked:
         if score.gain > PROMISE:
             best.setdefault((form.kind, form.where, form.note), (score, form))
     plainest = sorted(best.values(), key=lambda pair: PROMISE * len(pair[0].sizes) - pair[0].gain)
-    chosen = plainest[:TRIED]
-    for score, form in plainest[TRIED:]:
-        own = [f for _, f in chosen if f.where == form.where and (f.limit or not form.limit)]
+    chosen: list[tuple[Score, Form]] = []
+    for pair in plainest:
+        alike = [f for _, f in chosen if (catalogue.curve(f.kind), f.at) == (catalogue.curve(pair[1].kind), pair[1].at)]
+        if len(chosen) < TRIED and len(alike) < TRIED // 2:
+            chosen.append(pair)
+    for score, form in [pair for pair in plainest if pair not in chosen]:
+        own = [f for _, f in chosen if f.at == form.at and (f.limit or not form.limit)]
         if (form.how == "force" and (not own or any(is_part(form, f) for f in own))) or (form.limit and not own):
             chosen.append((score, form))
     return chosen
@@ -119,7 +126,7 @@ def is_part(form: Form, whole: Form) -> bool:
 
 def _taken(form: Form, terms: Sequence[Term]) -> bool:
     """Has the model that form already, or one of a curve of which a place has only one?"""
-    there = [t.form for t in terms if t.form.where == form.where]
+    there = [t.form for t in terms if t.form.at == form.at]
     one = catalogue.curve(form.kind)
     return any((f.kind, f.note) == (form.kind, form.note) or (one != form.kind and catalogue.curve(f.kind) == one) for f in there)
 
@@ -150,8 +157,9 @@ def _bent(bench: Bench, index: int, terms: Sequence[Term]) -> list[tuple[Score, 
         row[at] = f.limit / free[at].unit
     nu = np.concatenate([bench.problem().nu(free, rows, bench.fit.by) for rows in np.array_split(shifts, -(-len(shifts) // AT_ONCE))])
     scored = list(zip(as_they_are(bench.fit, nu[1:] - nu[0]), forms, strict=True))
-    best = [max((p for p in scored if p[1].kind == k), key=lambda p: p[0].gain)[1] for k in kinds]
-    return [(Score(_moved_gain(bench, form), np.zeros(1)), form) for form in best]
+    best = [max((p for p in scored if p[1].kind == k), key=lambda p: p[0].gain) for k in kinds]
+    gains = [_moved_gain(bench, f) if s.gain > PROMISE or not ACTUATORS[f.how].small else 0.0 for s, f in best]
+    return [(Score(gain, np.zeros(1)), form) for gain, (_, form) in zip(gains, best, strict=True)]
 
 
 def _moved_gain(bench: Bench, form: Form) -> float:
@@ -168,6 +176,23 @@ def _holds(bench: Bench, trials: Sequence[Trial], terms: Sequence[Term]) -> list
     late = [t for t in trials if t.form.how == "input_delay" and t.form.where not in taken and t.gain > max(0.5 * most, PROMISE)]
     found = [holding.propose(bench, t.form.index, t.fit.value(t.term.free[0].target)) for t in late]
     return [Term(form, (), free_of(bench, form)) for form in found if form]
+
+
+def _of_all(bench: Bench, base: Fit, trials: Sequence[Trial], moved: Sequence[Motion], terms: Sequence[Term]) -> list[Trial]:
+    """Trials of laws that take away all of an element, for those that gained at least half as much as the best one with a share of it: with
+    both a share and a width, neither is known well."""
+    most, found = max((t.gain for t in trials), default=0.0), []
+    for t in trials:
+        form = whole(bench, t) if t.gain > max(0.5 * most, PROMISE) else None
+        if form:
+            found.append(as_it_is(bench, base, form, moved, terms))
+    return found
+
+
+def as_it_is(bench: Bench, base: Fit, form: Form, moved: Sequence[Motion], terms: Sequence[Term]) -> Trial:
+    """A form fitted from its own values on, beside the terms accepted, in a model of its own."""
+    model, (term,) = with_forms(bench, [form], moved, len(terms))
+    return replace(_fitted(bench, base, model, moved, terms, term, np.zeros(len(term.free))), model=model)
 
 
 def _slope(bench: Bench, form: Form) -> Array:
@@ -190,7 +215,8 @@ def _fitted(bench: Bench, base: Fit, wide: Model, moved: Sequence[Motion], terms
     by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))
     starts, runs = [(*bench.fit.free, *_sized(term, sizes))], []
     if term.form.how == "clip" or any(f.log and f.sigma > GUESSED_DEVIATION for f in bench.nominal):
-        little = np.clip(sizes, *np.outer((-1.0, 1.0), [LITTLE * f.unit for f in term.free if not f.log]))
+        most = [LITTLE * f.unit for f in term.free if not f.log]
+        little = np.clip(sizes[: len(most)], *np.outer((-1.0, 1.0), most))
         own = {f.target for f in bench.nominal}
         nominal = (*bench.nominal, *(f for f in bench.fit.free if f.target not in own))
         starts += [(*nominal, *_sized(term, little)), (*bench.fit.free, *_sized(term, little))]

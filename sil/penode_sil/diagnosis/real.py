@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import constants
 
 from penode_gen import units
-from penode_gen.model import GROUND, Model
+from penode_gen.model import Model
 
-from . import catalogue, innovate, parameters
+from . import catalogue, innovate, offsets as offsets_of, parameters
 from .catalogue import drives, friction
 from .catalogue.form import Form, Motion, Sizes
 from .evidence.bench import Bench, build
@@ -27,11 +26,11 @@ from .fit import Free
 from .innovate import Found
 from .noise import Experiment
 from .plant import Place
-from .propose import FREE_RUN, SMALL, motions
+from .propose import FREE_RUN, motions
 from .result import MAY_BE_NOTHING, Cause, Named, Value, place
 from .rounds import MIN_TAKEN, name_of, terms_of
 from .terms import Term, Trial
-from .worth import RIGHT, WORTH, Z_95, confounded, least, own_of_sensors, share, systematic, undetermined
+from .worth import RIGHT, WORTH, Z_95, least, share, systematic, undetermined
 
 Array = NDArray[np.float64]
 RIVAL = (
@@ -105,11 +104,14 @@ def answer(
     for a, term in [(accepted, term) for accepted in found.named for term in accepted.terms]:
         enough, chance, first = least(found.level, a.trial.whole), chances[a.trial], term is a.terms[0]
         size = share(plain, [t for t in named if name_of(t) == name_of(term)], plain.fit, moved)
-        rivals = _rivals(chance, term) if first else _loads(model, bench.places[term.form.index])
+        rivals = _rivals(chance, term) if first else offsets_of.inputs_alike(model, bench.places[term.form.index])
+        rivals = (*rivals, *(Named(*same) for same in term.form.alike))
         cause = _cause(model, plain, moved, term, size, rivals, _sure(chance, a.trial.form), found.level)
         log(f"{cause.kind} at {cause.where}: {size:.1%} of the force there")
         if size >= enough and not cause.may_be_nothing:
             causes = _merged(causes, cause)
+            if size < WORTH and term.form.how == "force":
+                notes.append(f"{place(*name_of(term))} is small: {size:.1%} of the force there")
         elif first:
             withheld.append(cause)
             notes.append(_small(term, f"{size:.1%} of the force there") if size < enough else f"{place(*name_of(term))} {MAY_BE_NOTHING}")
@@ -123,8 +125,8 @@ def answer(
         sure = _sure(_weighed(a.trials), a.trial.form)
         withheld.append(_cause(model, after, moved, a.terms[0], a.trial.share, (), sure, found.level))
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
-    shifts = np.full(len(noise), np.inf) if any(c.kind in stopped for c in causes) else _shifts(after, found.run, found.terms)
-    biased, remarks = _offsets(model, after, Probe.of(after), found.level, shifts)
+    shifts = np.full(len(noise), np.inf) if any(c.kind in stopped for c in causes) else offsets_of.shifts(after, found.run, found.terms)
+    biased, remarks = offsets_of.named(model, after, found.level, shifts)
     notes += [*judged.notes, *remarks]
     run = found.run
     offsets = [s.name for s in model.sensors if any(f.target == bias(s.name) for f in run.free)]
@@ -136,20 +138,20 @@ def answer(
 
 
 def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[Found, list[Motion], parameters.Judged]:
-    """What the search finds, the motion with it, and its parameters. Where one of these only makes up for a form that is small beside it,
-    small forms of at least WORTH of the force there are named too: they took little because the parameter had taken the rest."""
+    """What the search finds, the motion with it, and its parameters. Where one of these only makes up for forms that are small beside it,
+    these are named too: they took little because the parameter had taken the rest."""
 
     def judged(found: Found) -> tuple[Found, list[Motion], parameters.Judged]:
         moved = motions(Probe.of(found.plain))
         return found, moved, parameters.judge(model, found, moved, RIGHT, log)
 
     first = judged(innovate.search(bench, log))
-    large = [a for a in first[0].small if a.trial.share >= WORTH]
-    if not first[2].absorbed or not large:
+    small = [a for a in first[0].small if a.trial.share > first[0].level]  # what is no more than the rest would name that at random
+    if not first[2].absorbed or not small:
         return first
-    wider = judged(first[0].naming(large))
+    wider = judged(first[0].naming(small))
     log(
-        f"{', '.join(first[2].absorbed)} may have compensated for {', '.join(' at '.join(name_of(a.trial)) for a in large)}; "
+        f"{', '.join(first[2].absorbed)} may have compensated for {', '.join(' at '.join(name_of(a.trial)) for a in small)}; "
         f"still does {wider[2].absorbed}"
     )
     return wider if set(wider[2].absorbed) < set(first[2].absorbed) else first
@@ -189,8 +191,8 @@ def _rivals(names: Sequence[tuple[Form, float]], term: Term) -> tuple[Named, ...
 
 def _sure(names: Sequence[tuple[Form, float]], form: Form) -> float:
     """Posterior of a name, with that of the other forms of its curve: of these the simplest that will do is taken."""
-    own = (catalogue.curve(form.kind), form.where)
-    return sum(p for f, p in names if (catalogue.curve(f.kind), f.where) == own)
+    own = (catalogue.curve(form.kind), form.at)
+    return sum(p for f, p in names if (catalogue.curve(f.kind), f.at) == own)
 
 
 def _explanations(named: Sequence[tuple[Term, Sequence[tuple[Form, float]]]]) -> tuple[tuple[tuple[Named, ...], float], ...]:
@@ -228,7 +230,8 @@ def _cause(
         parts = {}
         for k, (name, part) in enumerate(zip(term.elements, form.parts, strict=True)):
             for key in (part.gain[0], *part.shapes):
-                parts[k, key] = values.get(f"{name}_{key}", bench.model.parameters[f"{name}_{key}"].value)
+                own = part.own[0] if part.own and key == part.gain[0] else f"{name}_{key}"
+                parts[k, key] = values.get(own, bench.model.parameters[own].value)
         linear: dict[str, float] = {}
         for e in model.elements:
             if any(e.name == n for n, _ in at.elements):
@@ -276,74 +279,3 @@ def _wider(bench: Bench, term: Term, size: float, level: float) -> float:
 def _values_of(bench: Bench, term: Term) -> list[Free]:
     """The free values of a term as they are in the bench."""
     return [f for f in bench.fit.free if f.target in {t.target for t in term.free}]
-
-
-def _offsets(model: Model, bench: Bench, probe: Probe, level: float, shifts: Array) -> tuple[list[Cause], list[str]]:
-    """Sensor offsets that the recordings show. An offset is a cause if it is surely above the share of the signal's rms that has a name
-    (`worth.least`, beside the unmodelled `level` that remains) and below 100 %, and above the shift [n_z] of the signal's mean by what else
-    was found, the curves of which are not known that well. Others, and those near 1 g, become notes. Nothing where start states have the
-    same effect: a plant without a spring to ground has no zero, and its sensors are off against each other at most."""
-    causes, notes = [], []
-    biases = [bias(s.name) for s in model.sensors]
-    shares, mixed = own_of_sensors(bench.model, bench.fit, biases), confounded(bench.model, bench.fit, biases)
-    rms = [max(float(np.nanstd(np.concatenate([r.y[:, j] for r in bench.records]))), 1e-300) for j in range(len(biases))]
-    if any(abs(mixed.get(b, 0.0)) > WORTH * shown for b, shown in zip(biases, rms, strict=True)):
-        off = ", ".join(s.name for s in model.sensors if bias(s.name) in mixed)
-        notes.append(f"the offsets of {off} differ; the recordings do not tell which is wrong")
-    for s, alone, shown, shift in zip(model.sensors, shares[:-1], rms, shifts, strict=True):
-        value, sd = bench.fit.value(bias(s.name)), bench.fit.deviation(bias(s.name))
-        if alone * abs(value) <= 3.0 * sd or bias(s.name) in mixed:
-            continue
-        # collinearity with other free values amplifies the effect of model error
-        sd, size = float(np.hypot(sd, systematic(level) * shown / alone)), abs(value)
-        large = least(level, 0.0) * shown < size - Z_95 * sd and size < shown and abs(size / constants.g - 1.0) > WORTH
-        if bench.places and size > shift and large:  # without places it may stand for any law
-            causes.append(
-                _load(model, bench, probe, s.name, value, sd) or _constant("sensor_bias", s.name, "bias", value, sd, units.si(s.unit))
-            )
-        else:
-            notes.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")
-    return causes, notes
-
-
-def _shifts(bench: Bench, run: Fit, terms: Sequence[Term]) -> Array:
-    """By how much terms shift the mean of each sensor [n_z] in a free run, by its slopes, each in its own direction."""
-    own = {f.target for t in terms for f in t.free if not f.log}
-    sizes = np.array([abs(f.value - f.origin) / f.unit * (f.target in own) for f in run.free])
-    whitened = 1.0 if bench.colour is None else np.abs(1.0 - bench.colour.taps.sum(axis=0))  # of a mean, is left
-    return np.abs(np.nanmean(np.where(run.used[:, :, None], run.slopes, np.nan), axis=0)) @ sizes / whitened
-
-
-def _constant(kind: str, where: str, name: str, value: float, sd: float, unit: str, alike: tuple[Named, ...] = ()) -> Cause:
-    return Cause(kind, where, {name: Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))}, RIGHT, alike)
-
-
-def _load(model: Model, bench: Bench, probe: Probe, sensor: str, offset: float, deviation: float) -> Cause | None:
-    """The constant force on a body, if any, with the same effect on all sensors as this `offset` (+- `deviation`) of one: the simpler
-    cause, and what an input or the sensor itself may be off by as well."""
-    i = [f.target for f in bench.fit.free].index(bias(sensor))
-    f = bench.fit.free[i]
-    used, white = bench.fit.used, 1.0 / np.sqrt(bench.fit.variance)
-    seen = (bench.fit.slopes[:, :, i] * white)[used] / f.unit
-    starts = (bench.fit.slopes * white[None, :, None])[used][
-        :, [not isinstance(x.target, str) and x.target[0] == "start" for x in bench.fit.free]
-    ]
-    for k, p in enumerate(bench.places):
-        if GROUND not in p.ends or p.role == "tyre":
-            continue
-        (column,) = probe.columns([(k, [np.ones(len(r)) for r in bench.records])], SMALL * float(np.min(bench.forces)))
-        force = (column * white)[used]
-        columns = np.column_stack([force, starts])
-        columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-        sizes = np.linalg.lstsq(columns, seen, rcond=1e-9)[0]
-        if np.linalg.norm(seen - columns @ sizes) < WORTH * np.linalg.norm(seen):
-            factor = float(sizes[0]) / float(np.linalg.norm(force))
-            value, sd = -factor * offset, abs(factor) * deviation
-            alike = (Named("sensor_bias", sensor), *_loads(model, p))
-            return _constant("constant_force", p.name, "force", value, sd, p.unit("N"), alike)
-    return None
-
-
-def _loads(model: Model, p: Place) -> tuple[Named, ...]:
-    """Inputs whose offset may be a constant force at a place."""
-    return tuple(Named("input_offset", x.name) for x in model.inputs if p.unit("N") == x.unit)

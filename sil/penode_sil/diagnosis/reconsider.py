@@ -4,13 +4,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, name_of, of_curve, simplest, terms_of
+from . import catalogue
+from .catalogue import others
+from .catalogue.form import Form
+from .evidence.observer import bias
+from .evidence.screening import Probe
+from .propose import as_it_is, is_part, motions
+from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, name_of, of_curve, scored, simplest, terms_of
 from .terms import Trial
-from .worth import mostly
+from .worth import Z_95, mostly, wrong
 
 
 def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
@@ -28,6 +35,41 @@ def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
             if gain > MIN_GAIN * (1 + more):
                 return other
     return best
+
+
+def centred(rounds: Rounds, grown: Grown) -> Grown:
+    """Exchanges a form that needs offsets of sensors for one with its middle elsewhere, if that predicts as well without any offset: where
+    a curve has its middle, and where a sensor has its zero, is the same, and this is one cause instead of two."""
+    fit = grown.bench.fit
+    biases = [f for b in (bias(s.name) for s in rounds.start.model.sensors) for f in fit.free if f.target == b]
+    if all(abs(f.value) <= Z_95 * fit.deviation(f.target) for f in biases):
+        return grown
+    none, sensors = {f.target for f in biases}, [s.name for s in rounds.start.model.sensors]
+    off = tuple((others.OFFSET, s) for s, f in zip(sensors, biases, strict=True) if abs(f.value) > Z_95 * fit.deviation(f.target))
+    for k, a in enumerate(grown.accepted):
+        values = {f.target: f.value for f in fit.free}
+        form = catalogue.aside(_fitted_shapes(a, values))
+        if form is None:
+            continue
+        form = replace(form, alike=off)
+        bench, _, within = rounds.beside([x for x in grown.accepted if x is not a])
+        plain = replace(bench, fit=bench.problem().at([f for f in bench.fit.free if f.target not in none], bench.fit.by))
+        t = as_it_is(plain, bench.fit, form, motions(Probe.of(bench)), terms_of(within))
+        t = scored(plain, bench.problem(t.model), rounds.blocks, t)
+        rounds.log(f"{form.kind} at {form.where} {form.note}: {_score(t) - _total(grown):.1f} nats more, without offsets")
+        if _score(t) >= _total(grown) - MIN_GAIN:
+            free = (*t.fit.free, *(replace(f, value=f.origin) for f in biases))
+            other = Accepted(replace(t, fit=replace(t.fit, free=free)), a.number, (), (t, *a.trials))
+            end = rounds.grow([*grown.accepted[:k], other, *grown.accepted[k + 1 :]])
+            if _total(end) >= _total(grown) - MIN_GAIN:
+                return end
+    return grown
+
+
+def _fitted_shapes(a: Accepted, values: Mapping[object, float]) -> Form:
+    """An accepted form with its shapes as they are fitted."""
+    parts = [part for term in a.terms for _, part in term.laws(values)]
+    return replace(a.trial.form, parts=tuple(parts))
 
 
 def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
@@ -49,14 +91,15 @@ def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
             continue
         good = rounds.good(bench, scores, within)
         own = max((_score(t) for t in good if name_of(t) == name_of(a.trial)), default=whole)
-        margin = max(MIN_GAIN, MIN_FORM * (own - float(np.sum(scores))))
         best = simplest(good, scores, terms_of(within)) if good else a.trial
-        simpler = len(best.term.free) < len(a.trial.term.free) and _score(best) >= own - margin
+        share = wrong(bench.level.size) if is_part(best.form, a.trial.form) else 1.0
+        less = max(MIN_GAIN, share * MIN_FORM * (own - float(np.sum(scores))))
+        simpler = len(best.term.free) < len(a.trial.term.free) and _score(best) >= own - less
         if name_of(best) != name_of(a.trial) and (simpler or _score(best) - own > MIN_GAIN):
             rounds.log(f"{name_of(best)} for {name_of(a.trial)}")
             number = 1 + max(x.number for x in found)  # a fresh one: fits of other forms still hold parameters named after the old one
             found[found.index(a)] = Accepted(best, number, (), good)
-            whole, loss = float(np.sum(rounds.beside(found)[1])), loss + margin * simpler
+            whole, loss = float(np.sum(rounds.beside(found)[1])), loss + less * simpler
             doubted, last = [*doubted, *last], []
         elif any(name_of(t) == name_of(a.trial) for t in good):
             found[found.index(a)] = replace(a, trials=good)  # its rivals are those beside all others

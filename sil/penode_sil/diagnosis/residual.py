@@ -240,16 +240,16 @@ def noise_rms(study: Study) -> Array:
     """
     e, level = study.experiments[0], study.levels[0]
     beyond = np.where(np.isfinite(e.quiet), e.quiet, level[-1])[e.band :]
-    return np.sqrt(np.mean(np.concatenate([level, beyond]), axis=0) + _driven(study))
+    return np.sqrt(np.mean(np.concatenate([level, beyond]), axis=0) + driven(study))
 
 
 def stated_noise(study: Study) -> Array:
     """The same with noise of sensors as the model file states it, where it does: slow noise, or more of it, may be what a model lacks."""
     stated = np.array([s.noise for s in study.model.sensors])
-    return np.where(stated > 0.0, np.minimum(np.sqrt(stated**2 + _driven(study)), noise_rms(study)), noise_rms(study))
+    return np.where(stated > 0.0, np.minimum(np.sqrt(stated**2 + driven(study)), noise_rms(study)), noise_rms(study))
 
 
-def _driven(study: Study) -> Array:
+def driven(study: Study) -> Array:
     """Mean power [n_z] that noise of the inputs has in the sensors."""
     e = study.experiments[0]
     through = study.linear.transfer(e.frequencies)[:, : len(study.model.sensors), : len(study.model.inputs)]

@@ -20,7 +20,7 @@ from ..errors import UserError
 from .fit import Fit, Free, Problem
 from .noise import Experiment
 from .plant import Linear, Place, external
-from .score import likely
+from .smoother import likely
 from .study import Study, watch
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from . import holding
+from . import holding, late
 from .adopting import adopt
 from .catalogue import curve
 from .evidence.bench import SIZES, Bench
@@ -21,7 +21,7 @@ from .evidence.prior import stated
 from .evidence.screening import Probe
 from .propose import PROMISE, is_part, motions, propose
 from .terms import Term, Trial
-from .worth import WORTH, Z_95, alone, least, mostly, share, undetermined
+from .worth import WORTH, Z_95, alone, least, mostly, share, undetermined, wrong
 
 Array = NDArray[np.float64]
 SCORED = 4  # of the promising trials, how many are scored on held-out blocks, beside the one with the best free run
@@ -103,7 +103,7 @@ class Rounds:
         drive that starts from rest. Empty without any."""
         best, total = [], float(np.sum(scores)) + 2.0 * MIN_GAIN
         trials, wide = propose(bench, (), self.log, self.stiffer)
-        for t in (_scored(bench, bench.problem(wide), self.blocks, x) for x in trials[:SCORED]):
+        for t in (scored(bench, bench.problem(x.model or wide), self.blocks, x) for x in trials[:SCORED]):
             beside, terms = adopt(bench, t, 0)
             beside, level = _based(beside, self.blocks)
             first = Accepted(t, 0, tuple(terms), (t,))
@@ -134,7 +134,7 @@ class Rounds:
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
         freest = sorted(trials, key=lambda t: -t.run)[:1]
         trials = [t for t in trials if t in trials[:SCORED] or t in freest]
-        trials = holding.told_apart(bench, wide, [_scored(bench, bench.problem(wide), self.blocks, t) for t in trials])
+        trials = holding.told_apart(bench, wide, [scored(bench, bench.problem(t.model or wide), self.blocks, t) for t in trials])
         better = [t.blocks - scores for t in trials]
         for t, b in zip(trials, better, strict=True):
             self.log(
@@ -157,7 +157,7 @@ def terms_of(accepted: Sequence[Accepted]) -> list[Term]:
 def _hidden(t: Trial, small: Trial) -> bool:
     """May a form at another place prove large once a small one is in the model? Its force is large enough; its share of the innovations
     rises when the small one is gone."""
-    return t.form.where != small.form.where and t.share >= WORTH
+    return t.form.at != small.form.at and t.share >= WORTH
 
 
 def _may_remain(bench: Bench, large: Sequence[bool], best: Trial) -> bool:
@@ -187,7 +187,7 @@ def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:
     return replace(bench, level=level, fit=fit), scores - stated(fit.free) / len(scores)
 
 
-def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
+def scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
     """A trial with its scores, as those of a bench."""
     own = [] if t.level == bench.level else [bench.level.size]
     level, fit, scores = blocks.fit_level(replace(bench, model=problem.predictor.model), problem, t.fit, t.level, own)
@@ -196,22 +196,32 @@ def _scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
 
 def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Trial:
     """Of the curve that predicts best, the form with the fewest values; one with more where it predicts every block better, and all of
-    them by MIN_FORM of what it gains. Curves that predict equally well, to MIN_GAIN, also rank by their values. A new name has to gain
-    as much more than another law of a name already accepted as a form has."""
-
-    def more_than(other: Trial) -> float:
-        return max(MIN_GAIN, MIN_FORM * float(np.sum(other.blocks - base)))
-
-    named = {name_of(t) for t in terms}
-    first = min((t for t in trials if np.sum(trials[0].blocks - t.blocks) <= MIN_GAIN), key=lambda t: (len(t.term.free), -np.sum(t.blocks)))
-    best = next((t for t in trials if name_of(t) in named and np.sum(trials[0].blocks - t.blocks) <= more_than(trials[0])), first)
+    them by `margin`. Curves that predict equally well, to MIN_GAIN, also rank by their values; to more, where one has half of
+    them (`_simplicity`). A new name has to gain as much more than another law of a name already accepted as a form has."""
+    named, most = {name_of(t) for t in terms}, trials[0]
+    alike = [t for t in trials if np.sum(most.blocks - t.blocks) <= margin(t, base, _simplicity(t, most))]
+    first = min(alike, key=lambda t: (len(t.term.free), -np.sum(t.blocks)))
+    best = next((t for t in trials if name_of(t) in named and np.sum(most.blocks - t.blocks) <= margin(most, base)), first)
     same = [t for t in trials if of_curve(t) == of_curve(best)]
     found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
     for t in more:
-        better = t.blocks - found.blocks
-        if np.all(better > 0.0) and np.sum(better) > more_than(found):
+        better, share = t.blocks - found.blocks, max(wrong(t.level.size), MIN_FORM) if is_part(found.form, t.form) else 1.0
+        if np.all(better > 0.0) and np.sum(better) > margin(found, base, share):
             found = t
     return found
+
+
+def _simplicity(t: Trial, other: Trial) -> float:
+    """Share of MIN_FORM by which a form may gain less than another of more values: MIN_FORM where it has half of them, all where it has
+    less. A mass on a spring and a damper may stand for many a law with one value, a spring and a damper for a delay."""
+    few, many = len(t.term.free), len(other.term.free)
+    return float(2 * few < many) or MIN_FORM * (2 * few <= many)
+
+
+def margin(t: Trial, base: Array, share: float = 1.0) -> float:
+    """What another form has to gain beyond a trial if it has more values, or another name: a `share` of MIN_FORM of its gain. One that has
+    all laws of the trial, and more, has to gain less where the world is less wrong: waves in other curves look like more laws."""
+    return max(MIN_GAIN, share * MIN_FORM * float(np.sum(t.blocks - base)))
 
 
 def _is_enough(part: Trial, t: Trial) -> bool:
@@ -220,15 +230,17 @@ def _is_enough(part: Trial, t: Trial) -> bool:
 
 
 def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
-    """Is a form enough better, with a size that is not zero?"""
+    """Is a form enough better, with a size that is not zero, nor a delay too short to be one?"""
     if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN):
+        return False
+    if t.form.how == "late" and t.fit.value(t.term.free[0].target) < late.SHORT * bench.step:
         return False
     known = undetermined(bench.model, t.fit)
     return all(abs(t.fit.value(f.target) - f.origin) > Z_95 * t.fit.deviation(f.target, known) for f in t.term.free if not f.log)
 
 
-def of_curve(t: Trial) -> tuple[object, str]:
-    return curve(t.form.kind), t.form.where
+def of_curve(t: Trial) -> tuple[object, int | str]:
+    return curve(t.form.kind), t.form.at
 
 
 def name_of(t: Term | Trial) -> tuple[str, str]:

@@ -14,24 +14,17 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen import laws, units
+from penode_gen import laws
 from penode_gen.model import Model
 
-from .catalogue import values as of_values
 from .catalogue.form import Motion, Moved
 from .evidence.bench import Bench
-from .explanation import Explanation
-from .hypotheses import Basis, size
-from .naming import Curve
 from .plant import Place
-from .result import Cause, Value
-from .study import Study
 from .terms import Term
 from .worth import LINEAR
 
 Array = NDArray[np.float64]
 Slopes = tuple[float, float]  # the least and the greatest
-SIDES = {"difference", "rebound"}  # values of laws that are straight on either side
 
 
 def off(nominal: float, own: float, slopes: Slopes, limit: float) -> bool:
@@ -51,33 +44,6 @@ def beside(model: Model, bench: Bench, terms: Sequence[Term], moved: Sequence[Mo
     return found
 
 
-def missed(study: Study, e: Explanation, causes: Sequence[Cause]) -> list[Cause]:
-    """Parameters of straight lines that are off beside laws with two sides, as causes of their own; the interval of each is from the least
-    to the greatest slope. Of other laws a curve is put together from several, whose slopes say less."""
-    values = {f.target: f.value for f in e.fit.free}
-    known = {x for c in causes for x in c.parameters}
-    found = []
-    for k, place in enumerate(study.places):
-        pairs = [
-            (t, n)
-            for t, n in zip(e.terms, e.built.names, strict=True)
-            if isinstance(t.candidate.what, Basis) and t.candidate.what.place == k
-        ]
-        sure = [c.confidence for c in causes if (c.kind, c.where) in {t.group for t, _ in pairs} and c.parameters.keys() & SIDES]
-        if len(sure) < len({t.group for t, _ in pairs}) or not sure:
-            continue
-        curve, reaches = Curve(*zip(*pairs, strict=True)), size([s.motions[k] for s in study.seen])
-        for name, quantity in _lines(study.model, place):
-            x = _grid(reaches["sv".index(quantity)])
-            force = curve(x, 0.0 * x, values) if quantity == "s" else curve(0.0 * x, x, values)
-            p, slopes = study.model.parameters[name], _range(force, x)
-            own = values.get(name, p.value)
-            if name not in known and not p.exact and off(p.value, own, slopes, p.tolerance):
-                value = Value(own + 0.5 * sum(slopes), units.si(p.unit), (own + slopes[0], own + slopes[1]))
-                found.append(of_values.cause(name, value, max(sure)))
-    return found
-
-
 def _grid(reach: float) -> Array:
     return np.linspace(-reach, reach, 401)
 
@@ -94,7 +60,7 @@ def _slopes(terms: Sequence[Term], bench: Bench, quantity: str, x: Array) -> Slo
     along = Moved(x, zeros, np.arange(len(x)) * bench.step) if quantity == "s" else Moved(zeros, x, np.arange(len(x)) * bench.step)
     for gain, part in (pair for term in terms for pair in term.laws(bench.fit.values)):
         known = laws.LAWS.get(part.law)
-        if part.force is not None or (known and known.states):
+        if known and known.states:
             low, high = low + min(gain, 0.0), high + max(gain, 0.0)
         else:
             force = force + gain * part.along(along)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -14,19 +14,16 @@ from numpy.typing import NDArray
 from penode_gen.model import Model, Parameter, Signal
 
 from . import plant
-from .effects import collect
 from .evidence.prior import SHARE
 from .fit import KEPT, Fit, Free, Problem
-from .hypotheses import size
 from .noise import Experiment, Metric, metric, sensor_levels
 from .plant import Linear, Place
-from .score import Regression, Seen, smooth
+from .smoother import Seen, smooth
 
 Array = NDArray[np.float64]
 SKEW = 0.001  # of a sample: channels are never sampled at exactly the same time
 LIMIT = 1.5  # tolerances: farther than that a parameter is wrong, which is a cause
 GUESSED_TOLERANCE = 0.5  # tolerance above which a parameter counts as a guess: it may change the behaviour of the plant entirely
-FEW = 4  # studies with other noise that are kept: the next step of a search may ask for one again
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,12 +37,9 @@ class Study:
     linear: Linear
     levels: tuple[Array, ...]
     metrics: tuple[Metric, ...]
-    nuisances: tuple[Free, ...]
     null: Fit
     seen: tuple[Seen, ...] = ()
     moving: bool = True  # start states are free
-    sizes: tuple[tuple[float, float], ...] = ()  # what deflection and rate reach, per place
-    nothing: float = 0.0  # loss of the null fit, see `loss`
 
 
 def guessed(model: Model) -> list[str]:
@@ -91,14 +85,12 @@ def watched(model: Model, found: Sequence[Place]) -> Model:
 MOVING = 10.0  # chi2 that a free start state must gain: recordings start at rest unless they show the contrary
 
 
-def begin(model: Model, experiments: Sequence[Experiment], set_name: str = "default") -> tuple[Study, Study]:
-    """The study with start states as they are likely (at rest, or free), and the other one."""
+def begin(model: Model, experiments: Sequence[Experiment], set_name: str = "default") -> Study:
+    """The study with start states as they are likely: at rest, or free."""
     free = null_study(model, experiments, set_name)
-    kept = tuple(f for f in free.nuisances if f.target[0] != "start")
-    rest = replace(free, nuisances=kept, null=refit(free, kept), moving=False)
+    rest = replace(free, null=refit(free, [f for f in free.null.free if f.target[0] != "start"]), moving=False)
     freedom = MOVING * len(model.states) * len(experiments)
-    rest = replace(rest, nuisances=kept)
-    return (rest, free) if rest.null.cost <= free.null.cost + freedom else (free, rest)
+    return rest if rest.null.cost <= free.null.cost + freedom else free
 
 
 def refit(study: Study, free: Sequence[Free]) -> Fit:
@@ -131,9 +123,7 @@ def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = 
         if guessed(model):  # what the file says is no point to linearise about
             linear = plant.linearise(fitted(model, fit), found, np.array(x[0][pick]), experiments[0].u[pick])
     fit = problem.solve(free)
-    study = Study(model, set_name, experiments, found, linear, tuple(levels), tuple(metrics), fit.free, fit)
-    seen = look(study, fit)
-    return replace(study, sizes=tuple(size([s.motions[k] for s in seen]) for k in range(len(found))))
+    return Study(model, set_name, experiments, found, linear, tuple(levels), tuple(metrics), fit)
 
 
 def fitted(model: Model, fit: Fit) -> Model:
@@ -143,52 +133,30 @@ def fitted(model: Model, fit: Fit) -> Model:
     return replace(model, parameters={**model.parameters, **changed})
 
 
-def noise_of(study: Study, fit: Fit, coloured: bool = True, robust: bool = True) -> tuple[tuple[Array, ...], tuple[Metric, ...]]:
-    """Noise levels and metrics as the residual of a fit shows them, see sensor_levels."""
+def _metrics_of(study: Study, fit: Fit) -> list[Metric]:
+    """Metrics of the noise as the residual of a fit shows it, see sensor_levels."""
     declared = np.array([s.noise for s in study.model.sensors])
-    levels, metrics = [], []
+    metrics = []
     for e, z in zip(study.experiments, fit.simulated, strict=True):
         h = study.linear.transfer(e.frequencies)[:, : len(declared), : len(study.model.inputs)]
-        levels.append(sensor_levels(e, np.where(e.good, e.y - z, 0.0), declared, h, coloured, robust))
-        metrics.append(metric(e, levels[-1], h))
-    return tuple(levels), tuple(metrics)
+        metrics.append(metric(e, sensor_levels(e, np.where(e.good, e.y - z, 0.0), declared, h, robust=False), h))
+    return metrics
 
 
 def loss(study: Study, fit: Fit) -> float:
     """-2 log likelihood of a fit with the noise that suits it best: what absorbs less into noise is worth more."""
-    _, metrics = noise_of(study, fit, robust=False)
     total = sum(f.offset**2 for f in fit.free)
-    for e, m, z in zip(study.experiments, metrics, fit.simulated, strict=True):
+    for e, m, z in zip(study.experiments, _metrics_of(study, fit), fit.simulated, strict=True):
         r = m(np.where(e.good, e.y - z, 0.0))
         total += float(r @ r) + m.volume
     return total
-
-
-@lru_cache(maxsize=FEW)
-def with_noise_of(study: Study, fit: Fit, coloured: bool = True) -> Study:
-    """The study with noise as a fit's residual shows it; itself if that is no other noise."""
-    levels, metrics = noise_of(study, fit, coloured)
-    change = max(float(np.max(np.mean(np.abs(np.log(new / old)), axis=0))) for new, old in zip(levels, study.levels, strict=True))
-    if change < 0.05:
-        return study
-    quiet = replace(study, levels=levels, metrics=metrics)
-    return replace(quiet, null=refit(quiet, study.nuisances))
-
-
-def regression(study: Study, fit: Fit, parameters: Sequence[str], kinds: Collection[str] = ()) -> Regression:
-    """All hypotheses beside a fit, or those of some kinds and all wrong parameters."""
-    seen = look(study, fit)
-    names = [s.name for s in study.model.sensors]
-    fitted = {f.target for f in fit.free}
-    own = [p for p in parameters if p in fitted]
-    return Regression(fit, *collect(study.model, study.experiments, study.metrics, seen, study.places, names, len(own), kinds), own)
 
 
 def watch(study: Study, fit: Fit) -> list[Array]:
     """Sensors, then deflection and rate of every place, as a fit simulates them: [n, n_z + 2 places] per recording."""
     more = 2 * len(study.places)
     wide = [widened(e, more) for e in study.experiments]
-    problem = Problem(watched(fit.model, study.places), wide, study.metrics, study.set_name, faults=fit.faults)
+    problem = Problem(watched(fit.model, study.places), wide, study.metrics, study.set_name)
     start = np.zeros((1, len(fit.free)))
     return [np.array(problem.simulate(e, fit.free, start)[0][0]) for e in range(len(study.experiments))]
 
@@ -197,7 +165,7 @@ def look(study: Study, fit: Fit) -> tuple[Seen, ...]:
     """The smoothed motion around a fit."""
     n_z = len(study.model.sensors)
     parts = zip(study.experiments, study.metrics, study.levels, watch(study, fit), strict=True)
-    return tuple(smooth(e, m, x, study.linear, study.places, z[:, :n_z], z[:, n_z:], study.moving) for e, m, x, z in parts)
+    return tuple(smooth(e, m, x, study.linear, study.places, z[:, :n_z], z[:, n_z:]) for e, m, x, z in parts)
 
 
 @lru_cache(maxsize=KEPT)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,7 +40,8 @@ class Term:
         found = []
         for name, part in zip(self.elements, self.form.parts, strict=True):
             shapes = {k: (values.get(f"{name}_{k}", v), unit) for k, (v, unit) in part.shapes.items()}
-            found.append((values.get(f"{name}_{part.gain[0]}", 0.0), replace(part, shapes=shapes)))
+            gain = values.get(*part.own) if part.own else values.get(f"{name}_{part.gain[0]}", 0.0)
+            found.append((gain, replace(part, shapes=shapes)))
         return found
 
 
@@ -48,7 +49,8 @@ class Term:
 class Trial:
     """A form beside those accepted, fitted: `gain` of the criterion; `share` of the force there (see `worth`); `taken`, the share of
     a sensor's innovation power beyond its noise that it explains, of the sensor that shows it most; `whole`, that share over all sensors
-    together; `run`: log likelihood of its free run, where one was made; `blocks` [blocks] of predictive density."""
+    together; `run`: log likelihood of its free run, where one was made; `blocks` [blocks] of predictive density; `model`: that of the fit,
+    where it is not that of all trials of its round."""
 
     form: Form
     term: Term
@@ -60,6 +62,7 @@ class Trial:
     whole: float = 0.0
     run: float = -np.inf
     blocks: Array | None = None
+    model: Model | None = None
 
 
 def drive(bench: Bench, index: int) -> Drive:
@@ -92,8 +95,8 @@ def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], fir
     elements, where, parameters, terms, model = [], [], {}, [], bench.model
     for i, form in enumerate(forms):
         if form.how == "clip":
-            model, value = clipping.limited(model, form, f"x{first}_{i}_limit")
-            terms.append(Term(form, (), (value,)))
+            model, values = clipping.limited(model, form, f"x{first}_{i}")
+            terms.append(Term(form, (), values))
             continue
         if form.how != "force":
             terms.append(Term(form, (), free_of(bench, form)))
@@ -101,31 +104,54 @@ def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], fir
         place, names, free = bench.places[form.index], [], []
         for j, part in enumerate(form.parts):
             name = f"x{first}_{i}_{j}"
-            own = {part.gain[0]: (0.0, part.gain[1]), **part.shapes}
+            own = {**({} if part.own else {part.gain[0]: (0.0, part.gain[1])}), **part.shapes}
             parameters |= {f"{name}_{key}": entry for key, entry in own.items()}
-            elements.append(_element(name, place.ends, part))
+            elements.append(element(name, place.ends, part))
             where.append(place)
             names.append(name)
-            size = moved[form.index].force / max(rms([part.along(m) for m in moved[form.index].parts]), 1e-300)
-            low, high = (0.0 if part.sign > 0 else -np.inf), (0.0 if part.sign < 0 else np.inf)
-            free.append(Free(f"{name}_{part.gain[0]}", 0.0, 0.05 * size, sigma=size, low=low, high=high))
-            for key, (value, _) in part.shapes.items():
-                if key not in part.fixed:
-                    free.append(
-                        Free(
-                            f"{name}_{key}", value, value, log=True, sigma=1.0, origin=value, low=value / part.span, high=part.span * value
-                        )
-                    )
+            free += _values(name, part, moved[form.index])
         terms.append(Term(form, tuple(names), tuple(free)))
     return extend(model, elements, parameters, where), terms
 
 
-def _element(name: str, ends: tuple[str, str], part: Part) -> Element:
+def _values(name: str, part: Part, motion: Motion) -> Iterator[Free]:
+    """The free values of a part: its gain, and its shapes in their logarithm. Of one that takes all of an element, the first shape is its
+    size, 0 where it has no effect."""
+    first = part.loose[:1] if part.own else []
+    if not part.own:
+        size = motion.force / max(rms([part.along(m) for m in motion.parts]), 1e-300)
+        low, high = (0.0 if part.sign > 0 else -np.inf), (0.0 if part.sign < 0 else np.inf)
+        yield Free(f"{name}_{part.gain[0]}", 0.0, 0.05 * size, sigma=size, low=low, high=high)
+    for key in part.loose:
+        value = part.shapes[key][0]
+        low, high = value / part.span, part.span * value
+        if key in first:
+            yield Free(f"{name}_{key}", value, 0.05 * value, sigma=value, low=low, high=high)
+        else:
+            yield Free(f"{name}_{key}", value, value, log=True, sigma=1.0, origin=value, low=low, high=high)
+
+
+def whole(bench: Bench, t: Trial) -> Form | None:
+    """The form of a trial with laws that take away all of an element, as a play in series with all of a spring does; None if it has others.
+    Of a narrow play, only its gap times what it takes is seen, and that stays as it was fitted."""
+    near = {n for n, _ in bench.places[t.form.index].elements} if t.form.how == "force" else set()
+    parts = []
+    for gain, part in t.term.laws(t.fit.values):
+        owned = [p for e in bench.base.elements if e.name in near and e.law == part.takes for p in e.arguments.values()]
+        if part.own or len(owned) != 1 or gain == 0.0:
+            return None
+        value, size = bench.base.parameters[owned[0]].value, part.loose[0]
+        shapes = {k: (x * abs(gain / value) if k == size else x, unit) for k, (x, unit) in part.shapes.items()}
+        parts.append(replace(part, shapes=shapes, own=(owned[0], value)))
+    return replace(t.form, parts=tuple(parts)) if parts else None
+
+
+def element(name: str, ends: tuple[str, str], part: Part) -> Element:
     """A part as an element whose parameters begin with its name."""
+    names = {key: f"{name}_{key}" for key in (part.gain[0], *part.shapes)} | ({part.gain[0]: part.own[0]} if part.own else {})
     if part.law in LAWS:
-        return Element(name, ends, part.law, {a: f"{name}_{a}" for a in LAWS[part.law].arguments})
-    keys = [part.gain[0], *part.shapes]
-    text = re.sub(r"\b(" + "|".join(keys) + r")\b", lambda m: f"{name}_{m[1]}", part.law)
+        return Element(name, ends, part.law, {a: names[a] for a in LAWS[part.law].arguments})
+    text = re.sub(r"\b(" + "|".join(names) + r")\b", lambda m: names[m[1]], part.law)
     text = re.sub(r"\b([sv])\b", lambda m: f"{m[1]}_{name}", text)
     return Element(name, ends, "expression", expression=re.sub(r"\bload\b", f"abs({part.load})", text))
 

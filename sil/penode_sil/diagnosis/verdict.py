@@ -1,83 +1,162 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The end of the search by innovations: a verdict on what it found, the extended model file, and what that gains."""
+"""The end of the search: a verdict on what it found, the extended model file, and what that gains."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from penode_gen.model import Model
 
-from . import applied, explanation, leftover, measuring, numerics, plausible, real, tones
-from .catalogue import drives, values as of_values
+from . import absorb, applied, leftover, measuring, nameless, numerics, plant, plausible, real, residual, tones
+from .catalogue import drives, others, values as of_values
 from .checks.case import Case, End
 from .checks.written import write_extended
 from .evidence.bench import UNSTATED
 from .fit import Fit
-from .judging import ENOUGH
+from .residual import Channel
 from .resolving import resolved
-from .result import UNKNOWN, Cause, Diagnosis, Named
+from .result import EXTENDED, UNKNOWN, Cause, Diagnosis, Gain, Named
 from .study import Study, fitted, guessed, look
-from .unmodelled import within
+from .worth import WORTH
 
 Array = NDArray[np.float64]
 Broken = Callable[[Fit], Sequence[Cause]]
-
-
-def supports(model: Model) -> bool:
-    """Can innovations judge a model? Not yet where motion is prescribed, for nothing moves, nor laws of networks."""
-    return bool(model.bodies or (model.states and not model.elements)) and not model.networks
+ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
 
 
 def searched(case: Case, study: Study) -> real.Answer:
-    """What the search by innovations finds."""
+    """What the search finds."""
     case.tell(0.3, "searching with an observer that follows unmodelled forces")
     return real.answer(case.model, study.places, study.experiments, study.linear.fastest, study.set_name, case.log, study.levels)
 
 
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What a search amounts to: `verdict` and `causes`, the share that these explain, errors of the step by sensor, notes, sets of causes
+    with their posterior; `doubt`: why the recordings may be of another plant."""
+
+    verdict: str
+    causes: tuple[Cause, ...]
+    share: float
+    numbers: dict[str, object]
+    notes: tuple[str, ...]
+    explanations: tuple[dict[str, object], ...]
+    doubt: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """An extended model, its text, what it gains, with notes on that, and the hold-out sample by sample."""
+
+    text: str
+    extended: Model
+    gain: dict[str, Gain]
+    notes: Sequence[str]
+    held: Sequence[Channel]
+
+    @staticmethod
+    def of(case: Case, study: Study, text: str, extended: Model, lost: Collection[str] = ()) -> Written:
+        """`lost`: sensors that lost samples."""
+        gain, notes, held = measuring.measure(study, extended, case.unused, lost=lost) if case.unused else ({}, [], [])
+        return Written(text, extended, gain, notes, held)
+
+
 def conclude(case: Case, study: Study, found: real.Answer, broken: Broken) -> End:
-    """The end of a search by innovations; without pictures, recordings and time. `broken`: sensors at fault beside a fit."""
+    """The end of a search; without pictures, recordings and time. `broken`: sensors at fault beside a fit."""
     study = replace(study, model=case.model)
     study = replace(study, seen=look(study, study.null))
-    model, bench = study.model, found.found.bench
-    made = applied.apply(model, bench, found.run, found.terms, found.offsets)
+    made = applied.apply(study.model, found.found.bench, found.run, found.terms, found.offsets)
     text, extended = resolved(study, made.text)
-    measured = _measured(study, bench.noise)
-    gain, more, held = measuring.measure(measured, extended, case.unused) if case.unused else ({}, [], [])
     after = tuple(measuring.started(extended, e, study)[1] for e in study.experiments)
     fit = replace(study.null, simulated=after)
+    noisy = not found.terms and _quiet(study, after, found.found.bench.noise)  # then the noise of the null fit is that of the sensors
+    measured = study if noisy else _measured(study, found.found.bench.noise)
+    faults = tuple(broken(fit))
+    judged = _judged(study, measured, found, after, faults)
+    written, withheld = Written.of(case, measured, text, extended, others.lost(judged.causes)), found.withheld
+    if judged.causes == (UNKNOWN,) and not judged.doubt and (unnamed := _unnamed(case, measured, found)):
+        (written, share, note), withheld = unnamed, ()
+        judged = replace(judged, share=share, notes=(*judged.notes, note))
+    elif judged.causes == (UNKNOWN,) and not judged.doubt and not found.terms and _better(written):
+        note = f"no cause is named; {EXTENDED} has the parameters that fit best within their tolerances: it predicts better"
+        judged = replace(judged, notes=(*judged.notes, note))
+    absorbed: dict[str, object] = {}
+    extended = write_extended(written.text, case)
+    if judged.verdict != "unexplained":
+        absorbed, more = absorb.absorbed(case, measured, found.terms, found.run.values)
+        judged = replace(judged, notes=(*judged.notes, *more))
+    rows = leftover.rows(study)
+    answer = Diagnosis(
+        judged.verdict,
+        judged.causes,
+        written.gain,
+        judged.numbers,
+        judged.share,
+        (study.null.cost - rows) / np.sqrt(2.0 * rows),
+        0.0,
+        (*[judged.doubt] * bool(judged.doubt), *case.remarks, *judged.notes, *made.left, *written.notes),
+        absorbed=absorbed,
+        explanations=judged.explanations,
+    )
+    return End(
+        answer,
+        measured,
+        extended,
+        fit,
+        written.held,
+        withheld,
+        lambda gone: conclude(case, study, found.without(gone), broken),
+        faults=faults,
+    )
+
+
+def _judged(study: Study, measured: Study, found: real.Answer, after: Sequence[Array], faults: Sequence[Cause]) -> Judged:
+    """The judgement of a search that leads to a simulation `after`, beside `faults` of sensors."""
+    model = study.model
     causes, notes = _plausible(model, found.causes)
     known = replace(
         found.run, free=tuple(f for f in found.run.free if f.target in guessed(model))
     )  # the others may compensate for laws that were added
     numbers, coarse = numerics.numerics(replace(measured, model=fitted(model, known)))
     share = max(_taken(study, after), found.taken, 0.0)  # the first without what sensors and inputs are off by
-    verdict = _verdict(found, causes, share, not causes and _quiet(study, after, bench.noise))
+    ways = (after, study.null.simulated)  # the second with values within their tolerances, and weighed by noise of the inputs too
+    quiet = [_quiet(study, x, found.found.bench.noise) for x in ways]
+    share = 1.0 if causes and quiet[0] else share  # also where the nominal fit, within tolerances, leaves as little
+    verdict = _verdict(found, causes, share, any(quiet))
+    doubt = plausible.doubt(measured) if verdict == "unexplained" or found.found.level > WORTH else ""
+    if doubt:
+        verdict, causes = "unexplained", ()
     if coarse and verdict != "unexplained":
         causes, verdict = (*causes, coarse), "explained" if verdict == "no_discrepancy" else verdict
-    explanations = _explanations(causes, found.explanations)
-    tone = tones.tone(study.experiments, study.metrics, after)
-    notes += [*found.notes, *made.left, *more, *([tones.note(model, tone)] if tone.detected else [])]
-    doubt = plausible.doubt(measured, None, verdict) if verdict == "unexplained" else ""
-    verdict, causes = beside_faults(verdict, causes, broken(fit), tone.detected)
-    rows = explanation.rows(study)
-    answer = Diagnosis(
-        verdict,
-        causes,
-        gain,
-        numbers,
-        share,
-        (study.null.cost - rows) / np.sqrt(2.0 * rows),
-        0.0,
-        (*[doubt] * bool(doubt), *case.remarks, *notes),
-        explanations=explanations,
-    )
-    written = write_extended(text, case)
-    return End(answer, measured, written, fit, held, found.withheld, lambda gone: conclude(case, study, found.without(gone), broken))
+    sets, tone = _explanations(causes, found.explanations), tones.tone(study.experiments, study.metrics, after)
+    verdict, causes = beside_faults(verdict, causes, faults, tone.detected)
+    notes += [*found.notes, *filter(None, [plant.placeless(study.places)]), *([tones.note(model, tone)] if tone.detected else [])]
+    return Judged(verdict, causes, share, numbers, tuple(notes), sets, doubt)
+
+
+def _better(written: Written) -> bool:
+    """Does a written model predict all sensors of the hold-out better than the nominal one?"""
+    return bool(written.gain) and all(g.after_rmse < g.before_rmse for g in written.gain.values())
+
+
+def _unnamed(case: Case, study: Study, found: real.Answer) -> tuple[Written, float, str] | None:
+    """The extended model with a network for what has no name, the share of the residual that it takes, and a note; None where it takes too
+    little, or does not predict the hold-out better than the nominal model."""
+    case.tell(0.83, "fitting what has no name")
+    unnamed = nameless.fitted(study, found.found.bench, found.run, found.terms)
+    if unnamed is None:
+        return None
+    terms = [*found.terms, unnamed.term]
+    made = applied.apply(study.model, unnamed.bench, unnamed.run, terms, found.offsets)
+    written = Written.of(case, study, *resolved(study, made.text))
+    if any(g.after_rmse > 1.01 * g.before_rmse for g in written.gain.values()):
+        return None
+    return written, unnamed.share, f"a small network beside {unnamed.term.form.where} explains a part of it, without a name"
 
 
 def beside_faults(verdict: str, causes: tuple[Cause, ...], faults: Sequence[Cause], tone: bool) -> tuple[str, tuple[Cause, ...]]:
@@ -102,9 +181,11 @@ def _taken(study: Study, after: Sequence[Array]) -> float:
 
 
 def _quiet(study: Study, after: Sequence[Array], noise: Array) -> bool:
-    """Does a simulation leave nothing but noise, tones aside: what the file states of a sensor, or else that of its samples [n_z]?"""
+    """Does a simulation leave nothing but noise, tones aside: what the file states of a sensor, or else that of its samples [n_z], and
+    noise of the inputs as it reaches the sensor?"""
     stated = np.array([s.noise for s in study.model.sensors])
-    return within(study, after, np.where(stated > 0.0, stated, noise)) and not leftover.left_over(study, after)
+    most = np.hypot(np.where(stated > 0.0, stated, noise), np.sqrt(residual.driven(study)))
+    return leftover.within(study, after, most) and not leftover.left_over(study, after)
 
 
 def _measured(study: Study, noise: Array) -> Study:

@@ -38,17 +38,23 @@ def least(level: float, taken: float) -> float:
 
 
 def systematic(level: float) -> float:
-    """What unmodelled forces of this share of all do to the size of a form, in its share of the force there: in proportion, up to the
-    mis-modelling, half of WORTH, of which SYSTEMATIC is."""
-    return SYSTEMATIC * min(2.0 * level / WORTH, 1.0)
+    """What unmodelled forces of this share of all do to the size of a form, in its share of the force there."""
+    return SYSTEMATIC * wrong(level)
+
+
+def wrong(level: float) -> float:
+    """How wrong a world is with an unmodelled force of this share of all: 1 from half of WORTH on, which SYSTEMATIC is of."""
+    return min(2.0 * level / WORTH, 1.0)
 
 
 def remaining(bench: Bench, run: Fit, stated: Array) -> float:
     """The unmodelled level beside all that was found, for `least` and `systematic`: that of the bench, or the largest share of a sensor's
     rms by which a free `run` misses it beyond noise, if that is more. In a free run a small force that lasts shows, which an observer
-    follows. Of white noise the means between updates have the less; of coloured noise [n_z], no more than is `stated`."""
+    follows. Of white noise the means between updates have the less; of coloured noise [n_z], no more than is `stated`; noise of the inputs
+    counts as it reaches the sensors."""
     white = bench.colour is None or not len(bench.colour.taps)
     floor = bench.noise**2 / bench.update if white else np.maximum(stated, bench.noise) ** 2
+    floor = floor + bench.gains().driven(max(map(len, bench.records)) // bench.update)
     predictor = bench.problem().predictor
     nu = np.concatenate(predictor.predict(run.free, np.zeros((1, len(run.free))), run.by)[0].nu, axis=1)[0]
     signals = [np.concatenate([r.y[:, j] for r in bench.records]) for j in range(len(floor))]
@@ -74,16 +80,18 @@ def alone(taken: float) -> bool:
 def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]) -> float:
     """Rms of terms of one name as a share of the force at their place, of their input, or of their sensor: as much of it as nothing else
     that is free could do as well, a parameter, an offset, a start: in forces, and in what sensors show. How much of a line is whose is a
-    matter of writing it down, so a force counts by what is left of it beside lines, that of a bent curve over BENT."""
+    matter of writing it down, so a force counts by what is left of it beside lines, and by how much of that is its own, for a resonance may
+    show more of a line than of the rest; that of a bent curve over BENT."""
     form, targets = terms[0].form, [f.target for t in terms for f in t.free]
     if form.how == "clip":
-        return clipping.share(bench, form, next(f for f in fit.free if f.target == targets[0]))
+        limit, *sharp = (next(f for f in fit.free if f.target == t) for t in targets)
+        return clipping.share(bench, form, limit, *(f.value for f in sharp))
     if form.how == "force":
         motion = moved[form.index]
         force = np.sum([np.concatenate(_force(t, fit, motion)) for t in terms], axis=0)
         beside = _beside(bench, form.index, motion, force)
         bent = 1.0 if all(_linear(t, fit, motion) for t in terms) else BENT
-        return min(_rms(beside), _rms(force) * own(bench.model, fit, targets)) / (bent * motion.force) if motion.force else 0.0
+        return _rms(beside) * own(bench.model, fit, targets, _lines(bench, form.index)) / (bent * motion.force) if motion.force else 0.0
     return max(_of_signal(bench, t, fit) for t in terms) * own(bench.model, fit, targets)
 
 
@@ -97,16 +105,21 @@ def undetermined(model: Model, fit: Fit) -> set[str]:
     return {m for m in masses if fit.deviation(m) > abs(fit.value(m))}
 
 
-def own(model: Model, fit: Fit, targets: Collection[object]) -> float:
-    """Share of what free values off their origins do to the innovations that no other one can do, 0 to 1. Masses stay as they are, for all
-    forces together with them are a scale that a sensor of motion does not show."""
-    return float(own_of_sensors(model, fit, targets)[-1])
+def own(model: Model, fit: Fit, targets: Collection[object], lines: Collection[object] = ()) -> float:
+    """Share of what free values off their origins do to the innovations that no other one can do, 0 to 1: of what is left of that beside
+    `lines`, which are free too. Masses stay as they are, for all forces together with them are a scale that a sensor of motion does not
+    show."""
+    return float(own_of_sensors(model, fit, targets, lines)[-1])
 
 
-def own_of_sensors(model: Model, fit: Fit, targets: Collection[object]) -> Array:
+def own_of_sensors(model: Model, fit: Fit, targets: Collection[object], lines: Collection[object] = ()) -> Array:
     """The same [n_z + 1] in what each sensor shows, then in all."""
     columns, others = _columns(model, fit, targets)
     done = columns @ np.array([(f.value - f.origin) / f.unit for f in fit.free if f.target in targets])
+    if lines:
+        straight = (fit.slopes[:, :, [f.target in lines for f in fit.free]] / np.sqrt(fit.variance)[None, :, None])[fit.used]
+        straight = straight / np.maximum(np.linalg.norm(straight, axis=0), 1e-300)
+        done = done - straight @ np.linalg.lstsq(straight, done, rcond=1e-9)[0]
     left = done - others @ np.linalg.lstsq(others, done, rcond=1e-9)[0]
     sensor = np.nonzero(fit.used)[1]
     masks = [*(sensor == j for j in range(fit.used.shape[1])), np.ones(len(done), bool)]
@@ -156,7 +169,8 @@ def shift(model: Model, bench: Bench, moved: Sequence[Motion], name: str) -> flo
     for e in model.elements:
         if e.law in LINEAR and name in e.arguments.values():
             _place, motion = next((p, m) for p, m in zip(bench.places, moved, strict=True) if any(e.name == n for n, _ in p.elements))
-            shares.append(abs(off) * (motion.s_rms if LINEAR[e.law] == "s" else motion.v_rms) / motion.force)
+            if motion.force > 0.0:
+                shares.append(abs(off) * (motion.s_rms if LINEAR[e.law] == "s" else motion.v_rms) / motion.force)
     log = next(f.log for f in bench.fit.free if f.target == name)
     return max(shares, default=abs(off / model.parameters[name].value)) * (1.0 if log else own(bench.model, bench.fit, [name]))
 
@@ -173,6 +187,12 @@ def _beside(bench: Bench, place: int, motion: Motion, force: Array) -> Array:
     return force - others @ np.linalg.lstsq(others, force, rcond=None)[0]
 
 
+def _lines(bench: Bench, place: int) -> list[str]:
+    """Parameters of the straight laws at a place."""
+    names = {n for n, _ in bench.places[place].elements}
+    return [p for e in bench.model.elements if e.name in names and e.law in LINEAR for p in e.arguments.values()]
+
+
 def _force(term: Term, fit: Fit, motion: Motion) -> list[Array]:
     """Of all parts of a term along every recording."""
     total = [np.zeros(len(m.s)) for m in motion.parts]
@@ -182,17 +202,17 @@ def _force(term: Term, fit: Fit, motion: Motion) -> list[Array]:
 
 
 def _linear(term: Term, fit: Fit, motion: Motion) -> bool:
-    """Is its force twice as large along a motion twice as large: a spring and a damper in series, a hidden mass?"""
-    twice = replace(motion, parts=tuple(replace(m, s=2.0 * m.s, v=2.0 * m.v) for m in motion.parts))
+    """Is its force twice as large, and of the other sign, along a motion that is: a spring and a damper in series, a hidden mass?"""
+    twice = replace(motion, parts=tuple(replace(m, s=-2.0 * m.s, v=-2.0 * m.v) for m in motion.parts))
     once, other = (np.concatenate(_force(term, fit, m)) for m in (motion, twice))
-    return bool(_rms(other - 2.0 * once) < SYSTEMATIC * _rms(other))
+    return bool(_rms(other + 2.0 * once) < SYSTEMATIC * _rms(other))
 
 
 def _of_signal(bench: Bench, term: Term, fit: Fit) -> float:
     value = fit.value(term.free[0].target)
     turn = 2.0 * np.pi / (UPDATES * bench.update * bench.step)  # of the motion [rad/s]
     own = ACTUATORS.get(term.form.how)
-    if own and (own.tried or own.by_change):
+    if own and (own.by_change or not own.small):
         return own.change(drive(bench, term.form.index), value)
     match term.form.how:
         case "input_offset":

@@ -10,13 +10,14 @@ from typing import Any
 
 from penode_gen.model import Model
 
-from ..by_noise import FARTHER
 from ..catalogue import channels, separating
 from ..catalogue.drives import alike
 from ..catalogue.experiments import proposed
 from ..noise import UNSEEN
 from ..reliability import reliability
 from ..result import OUTSIDE, Cause, Diagnosis, Named, place
+
+FARTHER = 0.02  # share of samples outside of the training, above which a hold-out is no evidence for a name
 
 
 def likely(d: Diagnosis) -> list[Mapping[str, Any]]:

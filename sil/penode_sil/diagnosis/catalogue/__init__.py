@@ -6,9 +6,26 @@ from collections.abc import Iterable
 
 from penode_gen.model import Model
 
-from . import aerated, bushings, channels, dampers, drives, experiments, friction, lines, loads, masses, others, plays, springs, tyres
+from . import (
+    aerated,
+    bushings,
+    channels,
+    dampers,
+    drives,
+    experiments,
+    friction,
+    lines,
+    loads,
+    masses,
+    networks,
+    others,
+    plays,
+    springs,
+    tyres,
+)
+from .form import Form
 
-FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres, aerated, lines)
+FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres, aerated, lines, networks)
 MEANING = {kind: text for file in (*FILES, drives, channels, others) for kind, text in file.MEANING.items()}
 OF = {kind: file for file in FILES for kind in file.KINDS}
 
@@ -28,6 +45,17 @@ def separating(kind: str, alternatives: Iterable[str], model: Model | None = Non
         return OTHERWISE if model is None else experiments.proposed(model, (kind, other))
 
     return "; ".join(dict.fromkeys(RIVALS.get(frozenset((kind, other))) or general(other) for other in alternatives))
+
+
+def aside(form: Form) -> Form | None:
+    """A form with its middle elsewhere; None where its kind has none."""
+    shifted = getattr(OF.get(form.kind), "aside", None)
+    return shifted(form) if shifted else None
+
+
+def stem(kind: str) -> str:
+    """What the elements of a kind are called in a model file."""
+    return getattr(OF.get(kind), "STEMS", {}).get(kind, kind)
 
 
 def curve(kind: str) -> object:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..hypotheses import lag
+from .memory import lag
 
 Array = NDArray[np.float64]
 TINY = np.finfo(float).tiny
@@ -61,9 +61,9 @@ class Value:
 class Actuator:
     """A kind of actuator. `output(u, values, step)`: its output [runs, n] for the recorded input u [runs, n] and a value for each run
     [runs]; `fitted`: how its value is fitted, and `tried`: values that a score test compares, where the effect is not proportional to
-    it; `size`: name and unit in a report ("": the unit of the input, "/s" behind it), and `shown` that for a value; `law` of
-    [actuators] that does the same, empty if there is none, and its `entry` for a value; `order` of actuators in series, as in the model
-    file; `by_change`: the value alone does not say how much of the input it changes."""
+    it; `small`: it is about so where they are small; `size`: name and unit in a report ("": the unit of the input, "/s" behind it), and
+    `shown` that for a value; `law` of [actuators] that does the same, empty if there is none, and its `entry` for a value; `order` of
+    actuators in series, as in the model file; `by_change`: the value alone does not say how much of the input it changes."""
 
     output: Callable[[Array, Array, float], Array]
     fitted: Callable[[Drive], Value]
@@ -74,6 +74,7 @@ class Actuator:
     tried: Callable[[Drive], Sequence[float]] | None = None
     order: int = 0
     by_change: bool = False
+    small: bool = True
 
     def change(self, drive: Drive, value: float) -> float:
         """Rms difference of output and recorded input, relative to the standard deviation of the input."""
@@ -175,7 +176,9 @@ def _drift() -> Actuator:
 
 
 def _behind() -> Actuator:
-    return Actuator(_lag, _time, ("lag", "s"), law="lag", entry=lambda v: {"time": ("lag", v, "s")}, order=4)
+    return Actuator(
+        _lag, _time, ("lag", "s"), law="lag", entry=lambda v: {"time": ("lag", v, "s")}, tried=lambda d: _halves(2.0 * d.update), order=4
+    )
 
 
 def _dead_zone() -> Actuator:
@@ -185,7 +188,9 @@ def _dead_zone() -> Actuator:
     def entry(value: float) -> Entry:
         return {"width": ("width", value, "")}
 
-    return Actuator(_dead, fitted, ("width", ""), law="dead_zone", entry=entry, tried=lambda d: _halves(0.5 * d.largest), order=1)
+    return Actuator(
+        _dead, fitted, ("width", ""), law="dead_zone", entry=entry, tried=lambda d: _halves(0.5 * d.largest), order=1, small=False
+    )
 
 
 def _saturation() -> Actuator:
@@ -198,7 +203,7 @@ def _saturation() -> Actuator:
     def tried(d: Drive) -> list[float]:
         return [1.0 / (d.largest * (1.0 - cut)) for cut in _halves(0.75)]
 
-    return Actuator(_saturated, fitted, ("limit", ""), _inverse, "saturation", entry, tried, order=1)
+    return Actuator(_saturated, fitted, ("limit", ""), _inverse, "saturation", entry, tried, order=1, small=False)
 
 
 def _slew_limit() -> Actuator:
@@ -211,7 +216,7 @@ def _slew_limit() -> Actuator:
     def tried(d: Drive) -> list[float]:
         return [time / d.largest for time in _halves(2.0 * d.period, d.step)]
 
-    return Actuator(_limited, fitted, ("rate", "/s"), _inverse, "slew_limit", entry, tried)
+    return Actuator(_limited, fitted, ("rate", "/s"), _inverse, "slew_limit", entry, tried, small=False)
 
 
 ACTUATORS: dict[str, Actuator] = {

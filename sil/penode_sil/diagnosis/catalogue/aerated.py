@@ -34,7 +34,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     for share in POCKETS:
         shapes = {"pocket": (share * motion.s_rms, "m"), "rate": (motion.v_rms, "m/s")}
-        yield Form(KINDS[0], place.name, "force", index, (Part("aerated_damper", ("damping", "N*s/m"), shapes, 1, ("rate",)),))
+        yield Form(KINDS[0], place.loss, "force", index, (Part("aerated_damper", ("damping", "N*s/m"), shapes, 1, ("rate",)),))
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

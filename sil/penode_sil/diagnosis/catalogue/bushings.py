@@ -6,9 +6,8 @@ from collections.abc import Iterable
 
 from penode_gen.model import Model
 
-from ..hypotheses import lag
 from ..plant import Place
-from .form import Form, Motion, Moved, Part, Sizes
+from .form import Form, Motion, Part, Sizes
 
 KINDS = ("maxwell_bushing",)
 MEANING = {"maxwell_bushing": "Relaxation: a spring and a damper in series, whose force decays when the motion stops."}
@@ -26,14 +25,14 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     for share in TIMES:
         tau = share * motion.s_rms / motion.v_rms
-        part = Part("maxwell_bushing", ("stiffness", "N/m"), {"relaxation": (tau, "s")}, 1, (), _pull)
+        part = Part("maxwell_bushing", ("stiffness", "N/m"), {"relaxation": (tau, "s")}, 1)
         yield Form(KINDS[0], place.name, "force", index, (part,))
-
-
-def _pull(m: Moved, relaxation: float):
-    return m.s - lag(m.s, relaxation, m.step)
+        mount = {"gap": (0.0, "m"), "relaxation": (tau, "s")}  # in series with a damper: a play without a gap
+        part = Part("loose_damper", ("damping", "N*s/m"), mount, 1, ("gap",), 10.0, takes="linear_damper")
+        yield Form(KINDS[0], place.name, "force", index, (part,), "of a damper")
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     """See Kind."""
-    return {"stiffness": ("N/m", v(0, "stiffness")), "relaxation_time": ("s", v(0, "relaxation"))}
+    stiffness = v(0, "damping") / v(0, "relaxation") if form.note else v(0, "stiffness")
+    return {"stiffness": ("N/m", stiffness), "relaxation_time": ("s", v(0, "relaxation"))}

@@ -2,16 +2,17 @@
 # Copyright (c) 2026 the penode authors
 """Dampers that are no straight lines: other to one side, bent, weaker with time."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from penode_gen.model import GROUND, Model
 
-from ..hypotheses import warm
 from ..plant import Place
 from . import friction
-from .form import Array, Form, Motion, Moved, Part, Sizes
+from .form import Form, Motion, Part, Sizes
 
 KINDS = ("asymmetric_damper", "degressive_damper", "quadratic_damper", "damper_fading")
 MEANING = {
@@ -44,50 +45,36 @@ RIVALS = {
     ("damper_fading", "degressive_damper"): "the same excitation at the start and at the end of one recording, at two amplitudes",
 }
 STRAIGHT = ("asymmetric_damper", "degressive_damper")
+WORKS = (0.25, 25.0)  # of the work of the rms rate in a recording: heat that warms a damper as far as it gets
 KNEES = (0.3, 1.0)  # of the rms rate; fitted down to friction.WIDEST, where the transition of a friction ends
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
     """See Kind."""
     if place.role == "body" and GROUND in place.ends:
-        yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, 1),))
+        yield Form(KINDS[2], place.loss, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, 1),))
         return
     if place.role != "force":
         return
-    yield Form(KINDS[0], place.name, "force", index, (Part("rebound_damper", ("damping", "N*s/m")),))
+    yield Form(KINDS[0], place.loss, "force", index, (Part("rebound_damper", ("damping", "N*s/m")),))
     for share in KNEES:
         bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1, span=share / friction.WIDEST)
-        yield Form(KINDS[1], place.name, "force", index, (bent,))
-    yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2")),))
+        yield Form(KINDS[1], place.loss, "force", index, (bent,))
+    yield Form(KINDS[2], place.loss, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2")),))
     for part in _fading(motion):
-        yield Form(KINDS[3], place.name, "force", index, (part,))
+        yield Form(KINDS[3], place.loss, "force", index, (part,))
 
 
 def _fading(motion: Motion) -> Iterable[Part]:
-    """With time, and by its heat, which the rms rate builds up in a quarter of a recording. Cooling starts at a tenth of a recording and at
-    all of it, and fits meet halfway: where it takes no longer than a stroke, the curve is that of a degressive damper."""
+    """With time, and by its heat, which ends at what the rms rate builds up in a quarter of a recording, or does not end.
+    Cooling starts at a tenth of a recording and at all of it, and fits meet halfway: where it takes no longer than a stroke, the curve is
+    that of a degressive damper."""
     gain = ("damping", "N*s/m")
-    yield Part("fading_damper", gain, {"time": (0.5 * motion.longest, "s")}, -1, (), _along(_faded))
-    work = (0.25 * motion.v_rms**2 * motion.longest, "m^2/s")
-    for share in (0.1, 1.0):
+    yield Part("fading_damper", gain, {"time": (0.5 * motion.longest, "s")}, -1)
+    for works, share in product(WORKS, (0.1, 1.0)):
+        work = (works * motion.v_rms**2 * motion.longest, "m^2/s")
         shapes = {"work": work, "cooling": (share * motion.longest, "s")}
-        yield Part("heating_damper", gain, shapes, -1, ("work",), _along(_warmed), span=10.0**0.5)
-
-
-def _faded(m: Moved, time: float) -> Array:
-    return 1.0 - np.exp(-m.t / time)
-
-
-def _warmed(m: Moved, work: float, cooling: float) -> Array:
-    return warm(m.v, m.t, work, cooling)
-
-
-LOST = {"fading_damper": _faded, "heating_damper": _warmed}  # by law: share of its gain that acts by now
-
-
-def _along(lost: Callable[..., Array]) -> Callable[..., Array]:
-    """Force along a motion for gain 1, of a damper that has lost such a share of it by now."""
-    return lambda m, **shapes: m.v * lost(m, **shapes)
+        yield Part("heating_damper", gain, shapes, -1, ("work",), span=10.0**0.5)
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
@@ -101,6 +88,15 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
             return {"knee": ("m/s", v(0, "knee")), **slopes}
         case "quadratic_damper":
             return {"coefficient": ("N*s^2/m^2", v(0, "coefficient"))}
-    (part,) = form.parts
-    end = LOST[part.law](v.first, **{name: v(0, name) for name in part.shapes})[-1] if v.first else 1.0
-    return {"loss": ("1", -v(0, "damping") * float(end) / own if own else 1.0)}
+    return {"loss": ("1", -v(0, "damping") * _lost(form.parts[0], v) / own if own else 1.0)}
+
+
+def _lost(part: Part, v: Sizes) -> float:
+    """Share of the gain of a law that acts at the end of the first recording, as the last fast motion shows it."""
+    if v.first is None:
+        return 1.0
+    fitted = replace(part, shapes={name: (v(0, name), unit) for name, (_, unit) in part.shapes.items()})
+    moved = v.first.whole()
+    rate = moved.v
+    last = int(np.flatnonzero(np.abs(rate) >= np.std(rate))[-1])
+    return float(fitted.along(moved)[last] / rate[last])

@@ -63,7 +63,7 @@ PARAMETERS = {
     "sensor_delay": {"delay": "from the motion to the reading"},
 }
 ALIKE = {"input_delay": "sensor_delay", "sensor_delay": "input_delay", "input_gain": "sensor_scale", "sensor_scale": "input_gain"}
-ALIKE |= {"input_sign": "sensor_sign", "sensor_sign": "input_sign"}
+ALIKE |= {"input_lag": "sensor_delay", "input_sign": "sensor_sign", "sensor_sign": "input_sign"}
 
 
 def alike(model: Model, kind: str, where: str) -> tuple[str, str] | None:
@@ -79,17 +79,16 @@ def inputs(model: Model, count: int) -> Iterable[Form]:
     That of a hold is for `holding`, which has to look for its period."""
     for j, i in enumerate(model.inputs[:count]):
         for kind, actuator in ACTUATORS.items():
-            if actuator.tried is None:
+            if actuator.small:
                 yield Form(kind, i.name, kind, j)
 
 
 def bent(model: Model, index: int, drive: Drive) -> Iterable[Form]:
-    """Forms of an input at all values that are tried; none of a position that elements act on, which no actuator can cut off."""
+    """Forms of an input at all values that are tried; of a position that elements act on none that cuts off, as no actuator can."""
     own = model.inputs[index].name
-    if any(own in e.ends for e in model.elements):
-        return
+    position = any(own in e.ends for e in model.elements)
     for kind, actuator in ACTUATORS.items():
-        for value in actuator.tried(drive) if actuator.tried else ():
+        for value in actuator.tried(drive) if actuator.tried and (actuator.small or not position) else ():
             yield Form(kind, own, kind, index, limit=value)
 
 

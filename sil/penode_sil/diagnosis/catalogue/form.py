@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -24,16 +24,24 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True, eq=False)
 class Moved:
     """Deflection s, rate v [n] of a place along one recording, at times t [s] from 0 on; magnitudes of the `loads` [n] there and at places
-    beside it, by their expressions."""
+    beside it, by their expressions. `left`: seconds of the recording behind its end, which are not looked at."""
 
     s: Array
     v: Array
     t: Array
     loads: Mapping[str, Array] = field(default_factory=dict)
+    left: float = 0.0
 
     @property
     def step(self) -> float:
         return float(self.t[1] - self.t[0])
+
+    def whole(self) -> Moved:
+        """To the end of the recording, as if it went back as it came: heat goes on like that while nothing is looked at."""
+        n = min(round(self.left / self.step), len(self.s) - 1)
+        back = slice(-2, -2 - n, -1)
+        t = self.t[0] + self.step * np.arange(len(self.t) + n)
+        return Moved(np.concatenate([self.s, self.s[back]]), np.concatenate([self.v, -self.v[back]]), t)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,28 +78,33 @@ class Motion:
 @dataclass(frozen=True, eq=False)
 class Part:
     """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies
-    it, with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values.
-    `force(motion, **shapes)` returns the force [n] for gain 1; given where that is faster than a simulation. A shape stays within a factor
-    of `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a jump, and may become as
-    small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where that is another cause. `load`: the
-    expression whose magnitude an expression calls `load`."""
+    it, with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values. A shape
+    stays within a factor of `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a
+    jump, and may become as small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where that is another
+    cause. `load`: the expression whose magnitude an expression calls `load`. `takes`: the law of linear elements that it takes a share of;
+    `own`: the parameter of such an element, and its value in the file, where it takes all of it: that is its gain, and the first free shape
+    its size."""
 
     law: str
     gain: tuple[str, str]
     shapes: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     sign: int = 0
     fixed: tuple[str, ...] = ()
-    force: Callable[..., Array] | None = None
     span: float = 30.0
     edge: str = ""
     kind: str = ""
     load: str = ""
+    takes: str = ""
+    own: tuple[str, float] | None = None
+
+    @property
+    def loose(self) -> list[str]:
+        """Its shapes that are free values."""
+        return [name for name in self.shapes if name not in self.fixed]
 
     def along(self, m: Moved) -> Array:
         """Force [n] for gain 1."""
         shapes = {name: value for name, (value, _) in self.shapes.items()}
-        if self.force is not None:
-            return self.force(m, **shapes)
         known = laws.LAWS.get(self.law)
         if known and known.states:
             return memory.force(self.law, {self.gain[0]: 1.0, **shapes}, m.s, m.step)
@@ -112,7 +125,8 @@ class Series:
 class Form:
     """A form of a kind at a place of the model (its index), an input or a sensor (its index): `how` is "force", or what is wrong with the
     input (a key of ACTUATORS, or "input_added": a `series`) or sensor ("scale", "late", "clip": beyond a `limit`). `limit`: where the fit
-    of a value begins whose effect is not proportional to it. Of one family, forms stand for the same name."""
+    of a value begins whose effect is not proportional to it. Of one family, forms stand for the same name. `alike`: kinds and places of
+    what does the same beside another form."""
 
     kind: str
     where: str
@@ -122,6 +136,12 @@ class Form:
     note: str = ""
     series: Series | None = None
     limit: float = 0.0
+    alike: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def at(self) -> int | str:
+        """Where it is, whatever it is called there: the index of its place, or the name of its input or sensor."""
+        return self.index if self.how == "force" else self.where
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -158,6 +178,11 @@ class Kind(Protocol):
 
     @staticmethod
     def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]: ...
+
+    @staticmethod
+    def aside(form: Form) -> Form | None:
+        """The same curve with its middle elsewhere, where that is a form; a file may be without this."""
+        return None
 
     @staticmethod
     def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]: ...

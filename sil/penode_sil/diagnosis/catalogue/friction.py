@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from penode_gen.model import GROUND, Model
 
-from ..hypotheses import slips
 from ..plant import Place
 from . import loads
-from .form import Form, Motion, Moved, Part, Sizes
+from .form import Form, Motion, Part, Sizes
 
 Array = NDArray[np.float64]
 KINDS = ("coulomb_friction", "stribeck_friction", "bouc_wen", "position_dependent_friction", "load_dependent_friction")
@@ -69,6 +68,13 @@ def coulomb(motion: Motion, edge: float) -> Part:
     return Part("coulomb_friction", ("force", "N"), {"transition": (edge * motion.v_rms, "m/s")}, 1, span=SPAN, edge="transition")
 
 
+def peak(motion: Motion, share: float) -> Part:
+    """What a friction has more at the lowest rates, of 1 at its largest; `share` of the rms rate, where it has fallen. One that is narrower
+    than the transition only makes up for that."""
+    text, shapes = "2.3316439815971242*rise*exp(-(v/width)^2)*v/width", {"width": (share * motion.v_rms, "m/s")}
+    return Part(text, ("rise", "N"), shapes, 1, span=share / EDGES[0])
+
+
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
     """See Kind."""
     if place.role == "tyre":
@@ -76,22 +82,23 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     grounded = place.role == "body" or GROUND in place.ends
     for edge in EDGES:
         slides = coulomb(motion, edge)
-        yield Form(KINDS[0], place.name, "force", index, (slides,))
+        yield Form(KINDS[0], place.loss, "force", index, (slides,))
         if grounded:
-            yield Form(KINDS[0], place.name, "force", index, (slides, replace(loads.constant(), kind=loads.KINDS[0])), "with a constant")
+            yield Form(KINDS[0], place.loss, "force", index, (slides, replace(loads.constant(), kind=loads.KINDS[0])), "with a constant")
         for share in PEAKS if place.role != "body" else ():
-            peak = Part("2.3316439815971242*rise*exp(-(v/width)^2)*v/width", ("rise", "N"), {"width": (share * motion.v_rms, "m/s")}, 1)
-            yield Form(KINDS[1], place.name, "force", index, (slides, peak))
+            yield Form(KINDS[1], place.loss, "force", index, (slides, peak(motion, share)))
         if place.role != "body":
             for grows, kind, note in _growing(motion, edge):
-                yield Form(kind, place.name, "force", index, (slides, grows), note)
+                yield Form(kind, place.loss, "force", index, (slides, grows), note)
                 if grows.load:
-                    yield Form(kind, place.name, "force", index, (grows,), f"{note} alone")
+                    yield Form(kind, place.loss, "force", index, (grows,), f"{note} alone")
     if place.role == "body":
         return
     for share in WAYS:
-        way = share * motion.s_rms
-        yield Form(KINDS[2], place.name, "force", index, (Part("bouc_wen", ("force", "N"), {"presliding": (way, "m")}, 1, (), _slip),))
+        bends = Part("bouc_wen", ("force", "N"), {"presliding": (share * motion.s_rms, "m")}, 1)
+        yield Form(KINDS[2], place.loss, "force", index, (bends,))
+        for width in PEAKS if share < WAYS[-1] else ():
+            yield Form(KINDS[1], place.loss, "force", index, (bends, peak(motion, width)), "with bristles")
 
 
 def _growing(motion: Motion, edge: float) -> Iterable[tuple[Part, str, str]]:
@@ -101,10 +108,6 @@ def _growing(motion: Motion, edge: float) -> Iterable[tuple[Part, str, str]]:
         yield Part(f"slope*{where}*tanh(v/width)", ("slope", "N/m"), shapes, fixed=("width",)), KINDS[3], note
     for load in motion.parts[0].loads:
         yield Part("share*load*tanh(v/width)", ("share", "1"), shapes, 1, ("width",), load=load), KINDS[4], f"of {load}"
-
-
-def _slip(m: Moved, presliding: float):
-    return slips(m.s, [presliding])[0]
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

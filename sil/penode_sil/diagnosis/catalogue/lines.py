@@ -23,31 +23,20 @@ RIVALS = {
     ("missing_damper", "quadratic_damper"): "one excitation at two amplitudes: linear damping scales with the amplitude",
     ("missing_spring", "constant_force"): "hold it at two positions: the force of a spring is another one",
 }
-LINES = {  # of a kind: its law, and the gain of that with its unit
-    "missing_damper": ("linear_damper", ("damping", "N*s/m")),
-    "missing_spring": ("linear_spring", ("stiffness", "N/m")),
+LINES = {  # of a kind: its law, and the gain of that with its unit and sign
+    "missing_damper": ("linear_damper", ("damping", "N*s/m"), 1),
+    "missing_spring": ("linear_spring", ("stiffness", "N/m"), 0),
 }
-POSITIVE = ("missing_damper",)
-
-
-def lacking(place: Place) -> list[str]:
-    """The kinds that may be at a place."""
-    return [kind for kind, (law, _) in LINES.items() if law in place.lacks]
-
-
-def sign(kind: str) -> int:
-    """Of the gain; 0: either."""
-    return int(kind in POSITIVE)
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
     """See Kind."""
-    for kind in lacking(place):
-        law, gain = LINES[kind]
-        yield Form(kind, place.name, "force", index, (Part(law, gain, {}, sign(kind)),))
+    for kind, (law, gain, sign) in LINES.items():
+        if law in place.lacks:
+            yield Form(kind, place.name, "force", index, (Part(law, gain, {}, sign),))
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     """See Kind."""
-    _, (name, unit) = LINES[form.kind]
+    _, (name, unit), _ = LINES[form.kind]
     return {name: (unit, v(0, name))}

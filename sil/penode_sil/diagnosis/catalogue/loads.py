@@ -2,11 +2,12 @@
 # Copyright (c) 2026 the penode authors
 """A constant force on a body."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from penode_gen.model import GROUND, Model
 
 from ..plant import Place
+from ..result import Cause, Named, Value
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("constant_force",)
@@ -35,3 +36,8 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     """See Kind. What pulls a body to ground is a force downwards; under prescribed motion, what a force adds."""
     return {"force": ("N", -v(0, "force") if v.moving else v(0, "force"))}
+
+
+def cause(where: str, force: Value, confidence: float, alternatives: Sequence[Named]) -> Cause:
+    """A load as a cause, with what has the same effect."""
+    return Cause(KINDS[0], where, {"force": force}, confidence, tuple(alternatives))

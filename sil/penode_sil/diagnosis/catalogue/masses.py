@@ -5,12 +5,11 @@
 from collections.abc import Iterable
 
 import numpy as np
-from scipy import signal
 
 from penode_gen.model import GROUND, Model
 
 from ..plant import Place
-from .form import Form, Motion, Moved, Part, Sizes
+from .form import Form, Motion, Part, Sizes
 
 KINDS = ("hidden_resonance",)
 MEANING = {"hidden_resonance": "A mass on a spring, attached to a body, that the model does not have."}
@@ -23,6 +22,7 @@ PARAMETERS = {  # what each number of a report means
 }
 RATIOS = (0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.2, 3.2, 5.0)  # of v_rms/s_rms, to which its frequency is tried
 LOSS = 0.1  # damping ratio at first
+SPAN = 0.5**0.5 / LOSS  # up to the ratio from which on there is no resonance
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
@@ -31,15 +31,8 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     for ratio in RATIOS:
         omega = ratio * motion.v_rms / motion.s_rms
-        part = Part("tuned_mass", ("mass", "kg"), {"omega": (omega, "1/s"), "loss": (LOSS, "1")}, 1, (), _hung)
+        part = Part("tuned_mass", ("mass", "kg"), {"omega": (omega, "1/s"), "loss": (LOSS, "1")}, 1, span=SPAN)
         yield Form(KINDS[0], place.name, "force", index, (part,))
-
-
-def _hung(m: Moved, omega: float, loss: float):
-    """Force for a mass of 1: omega^2 (s - p) + 2 loss omega (v - p'), p'' = that."""
-    b, a, _ = signal.cont2discrete(([2 * loss * omega, omega**2], [1.0, 2 * loss * omega, omega**2]), m.step, "bilinear")
-    own = signal.lfilter(np.squeeze(b), a, m.s)
-    return omega**2 * (m.s - own) + 2.0 * loss * omega * (m.v - np.gradient(own, m.step))
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Forces of laws with states of their own along a motion: from the same C as the model's."""
+"""Forces of laws with states of their own along a motion, from the same C as the model's; and a lag."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_banded
 
 import penode_gen
 from penode_gen import laws
@@ -34,6 +35,12 @@ e = {{ between = ["x", "ground"], law = "{law}", {arguments} }}
 [outputs]
 force = {{ value = "F_e", unit = "N" }}
 """
+
+
+def lag(x: Array, tau: float, step: float) -> Array:
+    """First-order lag of x."""
+    a = np.exp(-step / tau)
+    return solve_banded((1, 0), np.stack([np.ones_like(x), np.full_like(x, -a)]), (1.0 - a) * x, check_finite=False)
 
 
 def force(law: str, values: Mapping[str, float], s: Array, step: float) -> Array:

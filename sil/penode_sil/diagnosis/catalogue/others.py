@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Causes without a law: of parameters, sensors, networks and numerics. Other modules find them."""
+"""Causes without a law: of parameters, sensors and numerics. Other modules find them."""
 
 from collections.abc import Sequence
 
-from ..result import Cause
+from ..result import Cause, Named, Value
 
 MEANING = {
     "wrong_parameter": "A parameter of the model file is off by more than its tolerance.",
@@ -12,11 +12,10 @@ MEANING = {
     "sensor_bias": "The sensor reads a constant or slowly drifting amount too much.",
     "sensor_clipping": "The sensor is cut off beyond a limit.",
     "sensor_dropout": "The sensor lost samples.",
-    "network_extrapolation": "A network is used outside of the range that it was trained on.",
     "integration_error": "The physics is right; the deployed step integrates it too coarsely.",
     "outside_taxonomy": "A residual remains that is not noise and that no known kind explains.",
 }
-DRIFTING = ("sensor_bias",)  # constant, or of any slow course: it has no form
+OFFSET = "sensor_bias"
 PARAMETERS = {  # what each number of a report means
     "wrong_parameter": {"its name": "value in the recordings"},
     "differs_between_recordings": {"its name": "a value for each recording"},
@@ -35,13 +34,22 @@ _CLIPPING, _DROPOUT = "sensor_clipping", "sensor_dropout"
 WHERE = {
     "wrong_parameter": "a parameter",
     "differs_between_recordings": "a parameter",
-    "network_extrapolation": "an element with a network",
     "integration_error": "the model",
     "outside_taxonomy": "none",
 }
+
+
+def lost(causes: Sequence[Cause]) -> set[str]:
+    """Sensors that lost samples."""
+    return {c.where for c in causes if c.kind == _DROPOUT}
 
 
 def still_at_fault(again: Sequence[Cause], before: Sequence[Cause]) -> list[Cause]:
     """Faults of sensors found `again` beside an explanation, without drop-outs of a sensor that only had a rail `before`."""
     rails = {f.where for f in before if f.kind == _CLIPPING} - {f.where for f in before if f.kind == _DROPOUT}
     return [f for f in again if f.kind != _DROPOUT or f.where not in rails]
+
+
+def offset(sensor: str, value: Value, confidence: float, alternatives: Sequence[Named] = ()) -> Cause:
+    """An offset of a sensor as a cause, with what has the same effect."""
+    return Cause(OFFSET, sensor, {"bias": value}, confidence, tuple(alternatives))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Another value of a parameter of the model file, as a cause. Both searches and `checks` find it."""
+"""Another value of a parameter of the model file, as a cause. The search and `checks` find it."""
 
 from __future__ import annotations
 

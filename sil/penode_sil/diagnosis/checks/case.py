@@ -42,7 +42,7 @@ class End:
     in the case's folder has it; `fit`: the training with the named causes, None without any; `held`: the hold-out sample by sample;
     `withheld`: causes that the extended model has, and that are too small to be named; `without`: the end of the same search without
     laws or offsets, by kind and place, and with the rest fitted again; `sets`: parameter sets of the extended model by names of recordings,
-    where these have their own; `other`: the end of a search that was not asked."""
+    where these have their own; `faults`: causes that samples of sensors show, whatever else is wrong."""
 
     answer: Diagnosis
     study: Study
@@ -52,4 +52,4 @@ class End:
     withheld: Sequence[Cause] = ()
     without: Callable[[Collection[tuple[str, str]]], End] | None = None
     sets: Mapping[str, str] = field(default_factory=dict)
-    other: Callable[[], End] | None = None
+    faults: Sequence[Cause] = ()

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,10 +13,10 @@ import numpy as np
 from penode_gen import units
 from penode_gen.model import Parameter
 
-from .. import measuring, numerics, search
+from .. import measuring, numerics
 from ..entries import table, toml, unlike
-from ..explanation import CHANCE, rows
 from ..fit import Fit, Free, Problem
+from ..leftover import CHANCE, chi2, rows
 from ..noise import UNSEEN
 from ..residual import rms, stated_noise
 from ..result import Cause, Diagnosis, Named, Value
@@ -48,9 +48,9 @@ class Own:
         return any(abs(a - b) > CHANCE * float(np.hypot(x, y)) for a, x in found for b, y in found)
 
 
-def different(case: Case, study: Study) -> End | None:
+def different(case: Case, study: Study, searched: Callable[[], End]) -> End | None:
     """The end of a diagnosis of recordings that differ by a parameter, and by nothing else: with it all sensors are within their noise, and
-    with a common value of it, whatever that is, they are not."""
+    with a common value of it, whatever that is, they are not; nor is there a common cause (see `common`) in the end of the search."""
     count, noise = len(study.experiments), stated_noise(study)
     if count == 1 or study.model.networks or not _missed(study, study.null, noise):
         return None
@@ -70,13 +70,15 @@ def different(case: Case, study: Study) -> End | None:
             return None
         good.append(found)
     good.sort(key=lambda x: x.fit.cost)
-    return _end(case, study, good) if good and not has_common_cause(case, study, good[0].fit) else None
+    return _end(case, study, good) if good and not common(study, searched(), good[0].fit) else None
 
 
-def has_common_cause(case: Case, study: Study, fit: Fit) -> bool:
-    """Does one cause with the same values in all recordings leave less than a fit with values of their own? A damper that is not linear has
-    another best value at another amplitude."""
-    return any(e.fit.cost < fit.cost for e in search.first(study, case.log)[1])
+def common(study: Study, end: End, fit: Fit) -> bool:
+    """Does the one cause that a search names, with the same values in all recordings, leave less than a fit with values of their own? A
+    damper that is not linear has another best value at another amplitude."""
+    if len(end.answer.causes) != 1 or end.answer.verdict == "unexplained" or end.fit is None:
+        return False
+    return chi2(study, end.fit.simulated) < fit.cost
 
 
 def _beyond(study: Study, k: int, noise: np.ndarray) -> bool:
@@ -138,7 +140,7 @@ def _text(case: Case, best: Own, sets: dict[str, str]) -> str:
     """The model file with the common fitted parameters, and a set for each recording."""
     model, p = case.model, case.model.parameters[best.name]
     per = units.factor(p.unit)
-    lines = [*heading(model, KIND, best.name), f"{best.name} = {table(entry(p, p.value) | {'tunable': True})}"]
+    lines = [*heading(model, f"{KIND} at {best.name}"), f"{best.name} = {table(entry(p, p.value) | {'tunable': True})}"]
     for f in best.fit.free:
         known = model.parameters.get(f.target) if isinstance(f.target, str) else None
         if known is not None and f.value != known.value:

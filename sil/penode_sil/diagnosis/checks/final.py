@@ -18,8 +18,8 @@ from .rules import RULES
 
 
 def checked(case: Case, end: End, mixes: Sequence[Mix] = ()) -> Diagnosis:
-    """The answer of a search after all rules, with figures and pictures of the written model; if no named cause is left, the answer of the
-    other search. `mixes`: exchanged or inverted channels that were corrected before. Raises UserError."""
+    """The answer of a search after all rules, with figures and pictures of the written model. `mixes`: exchanged or inverted channels that
+    were corrected before. Raises UserError."""
     (case.output / REJECTED).unlink(missing_ok=True)  # of an answer before
     case.tell(0.87, "checking the extended model")
     table = tabled(case, end)
@@ -28,8 +28,6 @@ def checked(case: Case, end: End, mixes: Sequence[Mix] = ()) -> Diagnosis:
             case.log(f"{rule.name}: {broken}")
             before, end = end, rule.consequence(case, end, table, broken)
             table = table if end.extended is before.extended else tabled(case, end)
-    if end.other is not None and end.answer.verdict == "unexplained":
-        return checked(case, end.other(), mixes)
     case.tell(0.9, "showing what is wrong")
     answer, train, held = with_figures(case, end, table)
     missing = missing_forces(end.study) if answer.verdict == "unexplained" else ()

@@ -23,7 +23,7 @@ from ..worth import RATIO
 from . import values
 from .case import Case, End
 from .figures import ROLES, Row, Table, misses, tabled
-from .written import write_extended
+from .written import heading, write_extended
 
 NOMINAL = ("nominal", "refitted")
 NOT_NAMED = f"not named, but in {EXTENDED}"
@@ -190,6 +190,20 @@ def by_values(case: Case, end: End, table: Table, found: Sequence[values.Few]) -
     return replace(end, answer=d, extended=extended, fit=fit, without=None)
 
 
+def unseen(case: Case, end: End, table: Table) -> list[str]:
+    """Sensors of the hold-out that are off by more than noise where nothing is named."""
+    rows = table.of(ROLES[1]) if end.answer.verdict == "no_discrepancy" else []
+    return [r.figure.signal for r in rows if all(r.sensor in misses([r], what, table.noise) for what in (*NOMINAL, "extended"))]
+
+
+def unexplained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
+    """Unexplained, with a note on why."""
+    names = ", ".join(dict.fromkeys(sensors))
+    note = f"{names}: the hold-out shows an effect that the training does not: train with recordings like that one"
+    d = end.answer
+    return replace(end, answer=replace(d, verdict="unexplained", causes=(UNKNOWN,), explained=0.0, notes=(*d.notes, note)))
+
+
 def coupled(case: Case, end: End, table: Table) -> list[tuple[str, float]]:
     """Sensors that a model without discrepancy misses by more than noise, as a high-pass explains better than the written one; and its
     corner [Hz]."""
@@ -223,6 +237,41 @@ def worse(case: Case, end: End, table: Table) -> list[str]:
     return list(dict.fromkeys(r.figure.signal for r in rows if worsened(r.rms("nominal"), r.rms("extended"))))
 
 
+def misled(case: Case, end: End, table: Table) -> list[str]:
+    """Sensors of the hold-out that named causes make worse than the nominal model, and worse than their noise, while the training is
+    predicted better: what acts there does not act in the hold-out."""
+    found = [c for c in _named(end) if c not in end.faults]
+    if not found or not case.holdout or any(worsened(r.rms("nominal"), r.rms("extended")) for r in table.of(ROLES[0])):
+        return []
+    off = misses(table.of(ROLES[1]), "extended", table.noise)
+    return [s for s in worse(case, end, table) if any(r.sensor in off for r in table.of(ROLES[1]) if r.figure.signal == s)]
+
+
+def withdrawn(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
+    """The end without the names, and with a written model that is the nominal one."""
+    names = [place(c.kind, c.where) for c in _named(end) if c not in end.faults]
+    off = f"makes {', '.join(sensors)} of the hold-out worse"
+    note = f"{' and '.join(names)} would explain the training, but {off}: train with more excitations"
+    extended = write_extended("\n".join([*heading(case.model, "nothing"), ""]), case)
+    d, causes = end.answer, tuple(end.faults) or (UNKNOWN,)
+    notes = [n for n in d.notes if not n.startswith(tuple(names))]
+    d = replace(d, verdict="unexplained", causes=causes, explanations=(), explained=0.0, notes=(*notes, note))
+    return replace(end, answer=d, extended=extended, fit=None, withheld=(), without=None)
+
+
+def needless(case: Case, end: End, table: Table) -> list[str]:
+    """Sensors that values within their tolerances, with nothing named, make worse."""
+    return worse(case, end, table) if end.answer.verdict == "no_discrepancy" and allowed(case, end) else []
+
+
+def plain(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
+    """The end with a written model that is the nominal one."""
+    extended = write_extended("\n".join([*heading(case.model, "nothing"), ""]), case)
+    d = end.answer
+    note = f"parameters that fit the training within their tolerances make {', '.join(sensors)} of the hold-out worse: left as they were"
+    return replace(end, answer=replace(d, notes=(*d.notes, note)), extended=extended, without=None)
+
+
 def reject(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
     """The written model under another name, and no more than a part explained."""
     written = case.output / EXTENDED
@@ -243,5 +292,8 @@ RULES = (
     Rule("no_discrepancy only if the nominal model misses nothing that the written one predicts", mended, explained),
     Rule("the fewest parameter values that explain as much", spread, by_values),
     Rule("no_discrepancy only if no sensor is off as behind a high-pass", coupled, unsure),
+    Rule("no_discrepancy only if the hold-out is within noise", unseen, unexplained),
+    Rule("no values within tolerances that predict worse than those of the file", needless, plain),
+    Rule("no name for what acts in training alone", misled, withdrawn),
     Rule("no model that predicts worse than the nominal one", worse, reject),
 )

@@ -20,8 +20,8 @@ from penode_gen.model import Model, Parameter
 from ...compared import worsened
 from ..catalogue import values as of_values
 from ..entries import table
-from ..explanation import CHANCE, only_noise, rows
 from ..fit import Fit, Free, Problem
+from ..leftover import CHANCE, only_noise, rows
 from ..result import Cause, Value
 from ..study import uncertain
 from ..worth import RIGHT, Z_95
@@ -164,7 +164,7 @@ def text(case: Case, causes: Sequence[Cause], x: Few) -> str:
     """The model file with the values of a fit in it, which has these causes."""
     model = case.model
     fitted = {f.target: f.value for f in x.fit.free if isinstance(f.target, str)}
-    lines = heading(model, causes[0].kind, ", ".join(c.where for c in causes))
+    lines = heading(model, f"{causes[0].kind} at {', '.join(c.where for c in causes)}")
     for p in model.parameters.values():
         if fitted.get(p.name, p.value) != p.value:
             lines.append(f"{p.name} = {table(entry(p, fitted[p.name]))}")

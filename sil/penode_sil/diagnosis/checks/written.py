@@ -29,10 +29,10 @@ def write_extended(text: str, case: Case) -> Model:
     return penode_gen.load(case.output / EXTENDED)
 
 
-def heading(model: Model, kind: str, where: str) -> list[str]:
-    """The first lines of a model file that extends another one by a cause, down to its parameters."""
+def heading(model: Model, learnt: str) -> list[str]:
+    """The first lines of a model file that extends another one by what was learnt, down to its parameters."""
     return [
-        f"# Extension of {model.path.name} from recordings: {kind} at {where}.",
+        f"# Extension of {model.path.name} from recordings: {learnt}.",
         "",
         "[model]",
         extends(model.path.resolve()),

@@ -100,12 +100,10 @@ def build(
     noise: Array,
     fastest: float,
     set_name: str = "default",
-    like: Bench | None = None,
     shape: Array | None = None,
 ) -> Bench:
-    """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]. `like`: the bench of
-    the nominal model if `model` is another one; base, updates, forces and colour are taken from it. `shape` [f, n_z]: spectrum of the noise
-    as a fit has left it; it counts if the recordings are likelier with it."""
+    """The bench of a plain model: `noise` [n_z] of its sensors, `fastest` natural frequency [Hz]. `shape` [f, n_z]: spectrum of
+    the noise as a fit has left it; it counts if the recordings are likelier with it."""
     wide = augmented(model)
     free = [f for f in map(parameter, model.parameters.values()) if f]
     spans = np.array([max(np.nanstd(np.concatenate([r.y[:, j] for r in records])), noise[j]) for j in range(len(noise))])
@@ -120,13 +118,11 @@ def build(
     plain = Fit((), Filter.none(0, 0), *(np.zeros(0),) * 2, np.zeros(0, bool), np.zeros(0), 0.0, 0.0)
     longest = sum(map(len, records)) * records[0].step
     first = int(np.clip(round(1.0 / (UPDATES * max(fastest, 2.0 / longest)) / records[0].step), 1, 200))
-    base, forces = like.base if like else augmented(model), np.ones(len(driven_by_noise(wide.states)))
-    bench = Bench(wide, set_name, tuple(places), tuple(records), base, (), first, forces, noise, fastest, Level(0.0, 1.0), plain)
-    if like:
-        bench = replace(bench, update=like.update, forces=like.forces, fastest=like.fastest, colour=like.colour)
-        x = [np.where(np.abs(s) < np.inf, s, 0.0) for s in _followed(bench)]
-    else:
-        bench, x = _moved(bench, model, spans)
+    forces = np.ones(len(driven_by_noise(wide.states)))
+    bench = Bench(
+        wide, set_name, tuple(places), tuple(records), augmented(model), (), first, forces, noise, fastest, Level(0.0, 1.0), plain
+    )
+    bench, x = _moved(bench, model, spans)
     starts = []
     for e, states in enumerate(x):
         for i, start in enumerate(model.start):
@@ -141,7 +137,7 @@ def build(
                 )
             )
     found = fit_null(replace(bench, free=(*free, *starts), nominal=(*free, *starts)))
-    if like or shape is None or is_white(shape):
+    if shape is None or is_white(shape):
         return found
     colour = Colour.of(shape, noise, bench.update, UPDATES // 2)
     other = fit_null(replace(bench, free=(*free, *starts), nominal=(*free, *starts), colour=colour))

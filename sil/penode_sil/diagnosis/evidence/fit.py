@@ -52,7 +52,7 @@ class Fit:
         at = [f.target in known for f in self.free]
         c[at, :] = c[:, at] = 0.0
         size = 1.0 / np.sqrt(np.maximum(np.diag(c), 1e-300))
-        return np.linalg.pinv(c * np.outer(size, size), rcond=1e-12, hermitian=True) * np.outer(size, size)
+        return np.linalg.pinv(np.nan_to_num(c * np.outer(size, size)), rcond=1e-12, hermitian=True) * np.outer(size, size)
 
     def deviation(self, target: object, known: Collection[object] = ()) -> float:
         """Standard deviation of a value, in its own unit, where some targets are `known`."""

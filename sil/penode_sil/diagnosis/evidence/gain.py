@@ -64,8 +64,18 @@ class Gains:
                 drive[i, i] = 2.0 * (level.size * force) ** 2 / level.tau
             else:
                 drive[i, i] = 2.0 * (level.size * force) ** 2 * level.tau
+        f, total = self._of_an_update(a, drive)
+        measured = total[n_x:, n_x:] + np.diag(self.noise**2 / self.samples)
+        gain = riccati(f[:n_x, :n_x], f[n_x:, :n_x], total[:n_x, :n_x], total[:n_x, n_x:], measured)
+        whole = np.zeros((len(self.into), n_z))
+        whole[[self.into.index(n) for n in self.names]] = gain
+        return Filter(whole, np.array([level.tau]))
+
+    def _of_an_update(self, a: Array, drive: Array) -> tuple[Array, Array]:
+        """Transition of the states and of the means of the sensors at the samples since the last update, from one update to the next, and
+        the covariance of what unmodelled forces of intensity `drive` and noise of the inputs add."""
+        n_x, n_z = len(a), len(self.noise)
         step, q = sampled(a, drive, self.period / self.samples)
-        # states, and means of the sensors at the samples since the last update, from one sample to the next
         n = n_x + n_z
         seen = self.plant.c / self.samples
         once = np.block([[step, np.zeros((n_x, n_z))], [seen @ step, np.eye(n_z)]])
@@ -75,11 +85,16 @@ class Gains:
         f, total = np.eye(n), np.zeros((n, n))
         for _ in range(self.samples):
             f, total = once @ f, once @ total @ once.T + noise
-        measured = total[n_x:, n_x:] + np.diag(self.noise**2 / self.samples)
-        gain = riccati(f[:n_x, :n_x], f[n_x:, :n_x], total[:n_x, :n_x], total[:n_x, n_x:], measured)
-        whole = np.zeros((len(self.into), n_z))
-        whole[[self.into.index(n) for n in self.names]] = gain
-        return Filter(whole, np.array([level.tau]))
+        return f, total
+
+    def driven(self, updates: int) -> Array:
+        """Variance [n_z] that noise of the inputs has in means of the sensors between updates, so many updates into a free run."""
+        n_x = len(self.plant.a)
+        f, total = self._of_an_update(self.plant.a, np.zeros((n_x, n_x)))
+        over, covariance = f[:n_x, :n_x], total[:n_x, :n_x]
+        for _ in range(int(np.log2(max(updates, 1)))):  # each doubles the time
+            covariance, over = covariance + over @ covariance @ over.T, over @ over
+        return np.diag(f[n_x:, :n_x] @ covariance @ f[n_x:, :n_x].T + total[n_x:, n_x:])
 
 
 def is_force(state: str) -> bool:

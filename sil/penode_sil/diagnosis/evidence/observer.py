@@ -34,7 +34,7 @@ MAX_INNOVATION = 1e15  # innovation of a run that left all bounds
 @dataclass(frozen=True, eq=False)
 class Record:
     """A recording: inputs u [n, n_u], sensors y [n, n_z] (NaN: nothing measured), `step` [s] apart; `held`: all inputs move in
-    steps, `smooth`: none does."""
+    steps, `smooth`: none does; `left`: seconds behind its end that are not looked at."""
 
     name: str
     step: float
@@ -42,11 +42,12 @@ class Record:
     y: Array
     held: bool = False
     smooth: bool = True
+    left: float = 0.0
 
     @staticmethod
     def of(e: Experiment) -> Record:
         held = e.held is not None and bool(e.held.all())
-        return Record(e.name, e.step, e.drive if e.held is None else e.u, np.where(e.good, e.y, np.nan), held, e.held is None)
+        return Record(e.name, e.step, e.drive if e.held is None else e.u, np.where(e.good, e.y, np.nan), held, e.held is None, e.left)
 
     @cached_property
     def between(self) -> dict[int, Array]:
