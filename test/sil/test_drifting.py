@@ -28,7 +28,7 @@ def answer(folder, slow, late, seed):
     def force(time):
         return 4.0 * np.sum(np.sin(2.0 * np.pi * tones * time + phases), axis=0)
 
-    acts, written = force(t - late), force(t[::FINE] / (1.0 - slow))  # it writes down what acts at that time
+    acts, written = force(t - late), force(t[::FINE] / (1.0 - slow))  # it records the force at that time
     rates = [[0.0, 1.0], [-STIFFNESS / MASS, -DAMPING / MASS]]
     x, v = lsim(StateSpace(rates, [[0.0], [1.0 / MASS]], np.eye(2), np.zeros((2, 1))), acts, t)[1].T
     a = (acts - STIFFNESS * x - DAMPING * v) / MASS

@@ -16,7 +16,7 @@ from scipy import constants
 from penode_gen import units
 from penode_gen.model import GROUND, Model
 
-from .catalogue import loads, others
+from .catalogue import drives, loads, others
 from .evidence.bench import Bench
 from .evidence.fit import Fit
 from .evidence.observer import bias
@@ -178,4 +178,4 @@ def shifts(bench: Bench, run: Fit, terms: Sequence[Term]) -> Array:
 
 def inputs_alike(model: Model, p: Place) -> tuple[Named, ...]:
     """Inputs whose offset may be a constant force at a place."""
-    return tuple(Named("input_offset", x.name) for x in model.inputs if p.unit("N") == x.unit)
+    return tuple(Named(drives.OFFSET, x.name) for x in model.inputs if p.unit("N") == x.unit)

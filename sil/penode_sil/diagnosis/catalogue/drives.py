@@ -17,6 +17,7 @@ from .form import Form, Sizes
 Array = NDArray[np.float64]
 INPUTS = (*ACTUATORS, "input_hold")
 SENSORS = ("sensor_scale", "sensor_delay")
+OFFSET = "input_offset"
 KINDS = (*INPUTS, *SENSORS)
 MEANING = {
     "input_gain": "The input that drives the plant is larger, or smaller, than its recording by a factor.",

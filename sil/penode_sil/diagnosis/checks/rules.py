@@ -239,7 +239,7 @@ def worse(case: Case, end: End, table: Table) -> list[str]:
 
 def misled(case: Case, end: End, table: Table) -> list[str]:
     """Sensors of the hold-out that named causes make worse than the nominal model, and worse than their noise, while the training is
-    predicted better: what acts there does not act in the hold-out."""
+    predicted better: the force there does not act in the hold-out."""
     found = [c for c in _named(end) if c not in end.faults]
     if not found or not case.holdout or any(worsened(r.rms("nominal"), r.rms("extended")) for r in table.of(ROLES[0])):
         return []
@@ -294,6 +294,6 @@ RULES = (
     Rule("no_discrepancy only if no sensor is off as behind a high-pass", coupled, unsure),
     Rule("no_discrepancy only if the hold-out is within noise", unseen, unexplained),
     Rule("no values within tolerances that predict worse than those of the file", needless, plain),
-    Rule("no name for what acts in training alone", misled, withdrawn),
+    Rule("no name for a force that acts in training alone", misled, withdrawn),
     Rule("no model that predicts worse than the nominal one", worse, reject),
 )
