@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.signal import butter, lfilter
 
+from penode_gen.model import Model
+
 from ...compared import REJECTED, rejected, worsened
 from .. import catalogue
 from ..catalogue import drives, values as of_values
@@ -252,11 +254,16 @@ def withdrawn(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
     names = [place(c.kind, c.where) for c in _named(end) if c not in end.faults]
     off = f"makes {', '.join(sensors)} of the hold-out worse"
     note = f"{' and '.join(names)} would explain the training, but {off}: train with more excitations"
-    extended = write_extended("\n".join([*heading(case.model, "nothing"), ""]), case)
+    extended = _as_it_was(case)
     d, causes = end.answer, tuple(end.faults) or (UNKNOWN,)
     notes = [n for n in d.notes if not n.startswith(tuple(names))]
     d = replace(d, verdict="unexplained", causes=causes, explanations=(), explained=0.0, notes=(*notes, note))
     return replace(end, answer=d, extended=extended, fit=None, withheld=(), without=None)
+
+
+def _as_it_was(case: Case) -> Model:
+    """The nominal model, written in place of an extended one."""
+    return write_extended("\n".join([*heading(case.model, "nothing"), ""]), case)
 
 
 def needless(case: Case, end: End, table: Table) -> list[str]:
@@ -266,7 +273,7 @@ def needless(case: Case, end: End, table: Table) -> list[str]:
 
 def plain(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End:
     """The end with a written model that is the nominal one."""
-    extended = write_extended("\n".join([*heading(case.model, "nothing"), ""]), case)
+    extended = _as_it_was(case)
     d = end.answer
     note = f"parameters that fit the training within their tolerances make {', '.join(sensors)} of the hold-out worse: left as they were"
     return replace(end, answer=replace(d, notes=(*d.notes, note)), extended=extended, without=None)
