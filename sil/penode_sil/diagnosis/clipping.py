@@ -21,10 +21,10 @@ from .fit import Free
 Array = NDArray[np.float64]
 KIND = "sensor_clipping"
 SHARES = (0.98, 0.94, 0.88, 0.8, 0.7)  # quantiles of abs(y) that are tried as limits
+MOST = 0.998  # share of the samples that are within a limit, bursts aside
 SOFT = "soft"  # note on a form that comes near its limit smoothly
-SOFT_TOPS = (1.05, 1.2, 2.0, 4.0)  # where that is, in the largest sample
 TINY = 1e-9  # of the limit, which has a logarithm
-SHARP = 2.0  # its exponent at first: 1 and more, a limit that cuts off where it is large
+SHARP, BLUNT = 4.0, 2.0  # its exponent at first, and the least: 2.6 is about a tanh; a limit that cuts off where it is large
 TOPS = (1.05, 1.2)  # and shares of the largest sample: a sensor that saturates softly shows none at its limit
 
 
@@ -47,8 +47,8 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score
             changes.append(change)
         return [s.gain for s in as_they_are(bench.fit, changes)]
 
-    gains, soft = gained(limits, np.inf), [top * float(np.max(y)) for top in SOFT_TOPS]
-    if len(bench.nominal) == len(bench.fit.free) and np.quantile(y, 0.998) - np.quantile(y, SHARES[0]) < 3.0 * bench.noise[index]:
+    gains, soft = gained(limits, np.inf), limits[len(SHARES) :]
+    if len(bench.nominal) == len(bench.fit.free) and _largest(bench, index) - np.quantile(y, SHARES[0]) < 3.0 * bench.noise[index]:
         gains = [max(pair) for pair in zip(gains, _gains_of_nominal(bench, index, limits), strict=True)]
     found = []
     for each, sizes, note in ((gains, limits, ""), (gained(soft, SHARP), soft, SOFT)):
@@ -84,7 +84,7 @@ def limited(model: Model, form: Form, stem: str) -> tuple[Model, tuple[Free, ...
     free = [Free(name, form.limit, form.limit, log=True, sigma=1.0, origin=form.limit)]
     if form.note:
         parameters[sharp] = Parameter(sharp, SHARP, "1")
-        free.append(Free(sharp, SHARP, SHARP, log=True, sigma=1.0, origin=SHARP, low=1.0))
+        free.append(Free(sharp, SHARP, SHARP, log=True, sigma=1.0, origin=SHARP, low=BLUNT))
     return replace(model, parameters=parameters, sensors=sensors), tuple(free)
 
 
@@ -93,6 +93,16 @@ def expression(signal: str, limit: str, sharp: str = "") -> str:
     if sharp:
         return f"({signal})*exp(-softplus({sharp}*log(abs({signal})/{limit} + {TINY}))/{sharp})"
     return f"min(max({signal}, -{limit}), {limit})"
+
+
+def is_possible(bench: Bench, form: Form, limit: float) -> bool:
+    """Has a sensor all samples within a limit, but for noise and a few that are far out? A friction looks like one that many are beyond."""
+    return bool(_largest(bench, form.index) <= limit + 3.0 * bench.noise[form.index])
+
+
+def _largest(bench: Bench, index: int) -> float:
+    """What hardly any sample of a sensor exceeds."""
+    return float(np.nanquantile(np.abs(np.concatenate([r.y[:, index] for r in bench.records])), MOST))
 
 
 def share(bench: Bench, form: Form, limit: Free, sharp: float = np.inf) -> float:

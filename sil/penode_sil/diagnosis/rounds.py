@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from . import holding, late
+from . import clipping, holding, late
 from .adopting import adopt
 from .catalogue import curve
 from .evidence.bench import SIZES, Bench
@@ -230,10 +230,12 @@ def _is_enough(part: Trial, t: Trial) -> bool:
 
 
 def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
-    """Is a form enough better, with a size that is not zero, nor a delay too short to be one?"""
+    """Is a form enough better, with a size that is not zero, nor a delay too short to be one, nor a limit that samples are beyond?"""
     if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN):
         return False
     if t.form.how == "late" and t.fit.value(t.term.free[0].target) < late.SHORT * bench.step:
+        return False
+    if t.form.how == "clip" and not clipping.is_possible(bench, t.form, t.fit.value(t.term.free[0].target)):
         return False
     known = undetermined(bench.model, t.fit)
     return all(abs(t.fit.value(f.target) - f.origin) > Z_95 * t.fit.deviation(f.target, known) for f in t.term.free if not f.log)
