@@ -76,12 +76,12 @@ def _line(recording: str, name: str, known: tuple[float, str]) -> str:
     return f"{wrong}; correct its unit, or say --channel {name}=NAME [UNIT]"
 
 
-def missed(study: Study) -> dict[str, float]:
-    """Share of each measured signal's power that the model misses, beyond noise, with all parameters within tolerance."""
+def missed(study: Study, simulated: Sequence[Array]) -> dict[str, float]:
+    """Share of each measured signal's power that a simulation misses, beyond noise."""
     found = {}
     for j, sensor in enumerate(study.model.sensors):
         left = whole = 0.0
-        for e, z, levels in zip(study.experiments, study.null.simulated, study.levels, strict=True):
+        for e, z, levels in zip(study.experiments, simulated, study.levels, strict=True):
             y, good = e.y[:, j], e.good[:, j]
             left += float(np.sum((y - z[:, j])[good] ** 2 - np.mean(levels[:, j])))
             whole += float(np.sum((y[good] - np.mean(y[good])) ** 2)) if good.any() else 0.0
@@ -90,13 +90,14 @@ def missed(study: Study) -> dict[str, float]:
     return found
 
 
-def doubt(study: Study) -> str:
-    """What to say of unexplained recordings if they are of another plant, or not of this model at all; empty if they may well be."""
-    misses = missed(study)
+def doubt(study: Study, after: Sequence[Array]) -> str:
+    """What to say of unexplained recordings if they are of another plant, or not of this model at all, even as it was extended to give the
+    simulation `after`; empty if they may well be."""
+    misses = missed(study, study.null.simulated)
     if max(misses.values(), default=0.0) < POOR:
         return ""
     problem = other_plant(study)
-    if not problem and max(misses.values()) > UNLIKE:
+    if not problem and max(misses.values()) > UNLIKE and max(missed(study, after).values()) > UNLIKE:
         shares = ", ".join(f"{max(0.0, 1.0 - share):.0%} of {name}" for name, share in misses.items())
         problem = f"the model explains {shares}; check that the signals were recorded together, and with this plant"
     return problem

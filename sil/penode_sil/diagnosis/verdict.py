@@ -128,7 +128,7 @@ def _judged(study: Study, measured: Study, found: real.Answer, after: Sequence[A
     quiet = [_quiet(study, x, found.found.bench.noise) for x in ways]
     share = 1.0 if causes and quiet[0] else share  # also where the nominal fit, within tolerances, leaves as little
     verdict = _verdict(found, causes, share, any(quiet))
-    doubt = plausible.doubt(measured) if verdict == "unexplained" or found.found.level > WORTH else ""
+    doubt = plausible.doubt(measured, after) if verdict == "unexplained" or found.found.level > WORTH else ""
     if doubt:
         verdict, causes = "unexplained", ()
     if coarse and verdict != "unexplained":

@@ -31,7 +31,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
             KINDS[0], place.name, "force", index, (Part("backlash", ("stiffness", "N/m"), {"gap": (gap, "m")}, 1, takes="linear_spring"),)
         )
         shapes = {"gap": (gap, "m"), "relaxation": (max(2e-3, 2.0 * motion.parts[0].step), "s")}
-        loose = Part("loose_damper", ("damping", "N*s/m"), shapes, 1, ("relaxation",), takes="linear_damper")
+        loose = Part("loose_damper", ("damping", "N*s/m"), shapes, 1, takes="linear_damper")
         yield Form(KINDS[0], place.name, "force", index, (loose,), "of a damper")
     if not model.bodies:  # a play shows in series with friction where no mass is in between
         for share in GAPS:
