@@ -141,7 +141,8 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
             hypotheses.append(np.stack([next(columns) for _ in f.parts], axis=-1))
         else:
             hypotheses.append(_slope(bench, f)[:, :, None])
-    return sorted(zip(scores(bench.fit, hypotheses), forms, strict=True), key=lambda pair: -pair[0].gain)
+    signs = [[p.sign for p in f.parts] if f.how == "force" else [0] for f in forms]
+    return sorted(zip(scores(bench.fit, hypotheses, signs), forms, strict=True), key=lambda pair: -pair[0].gain)
 
 
 def _bent(bench: Bench, index: int, terms: Sequence[Term]) -> list[tuple[Score, Form]]:
