@@ -63,7 +63,8 @@ class Actuator:
     [runs]; `fitted`: how its value is fitted, and `tried`: values that a score test compares, where the effect is not proportional to
     it; `small`: it is about so where they are small; `size`: name and unit in a report ("": the unit of the input, "/s" behind it), and
     `shown` that for a value; `law` of [actuators] that does the same, empty if there is none, and its `entry` for a value; `order` of
-    actuators in series, as in the model file; `by_change`: the value alone does not say how much of the input it changes."""
+    actuators in series, as in the model file; `by_change`: the value alone does not say how much of the input it changes; `smoothed`: the
+    output at the rows for an input that is held between them, where that moves between rows as a line rather than in steps."""
 
     output: Callable[[Array, Array, float], Array]
     fitted: Callable[[Drive], Value]
@@ -75,6 +76,7 @@ class Actuator:
     order: int = 0
     by_change: bool = False
     small: bool = True
+    smoothed: Callable[[Array, Array, float], Array] | None = None
 
     def change(self, drive: Drive, value: float) -> float:
         """Rms difference of output and recorded input, relative to the standard deviation of the input."""
@@ -101,6 +103,11 @@ def _shifted(u: Array, values: Array, step: float) -> Array:
 
 def _lag(u: Array, values: Array, step: float) -> Array:
     return np.array([x[0] + lagging(x - x[0], max(tau, 1e-3 * step), step) for x, tau in zip(u, values, strict=True)])
+
+
+def _lag_of_steps(u: Array, values: Array, step: float) -> Array:
+    before = np.concatenate([u[:, :1], u[:, :-1]], axis=1)
+    return np.array([x[0] + lag(x - x[0], max(tau, 1e-3 * step), step) for x, tau in zip(before, values, strict=True)])
 
 
 def _dead(u: Array, values: Array, step: float) -> Array:
@@ -177,7 +184,7 @@ def _drift() -> Actuator:
 
 def _behind() -> Actuator:
     return Actuator(
-        _lag, _time, ("lag", "s"), law="lag", entry=lambda v: {"time": ("lag", v, "s")}, tried=lambda d: _halves(2.0 * d.update), order=4
+        _lag, _time, ("lag", "s"), law="lag", entry=lambda v: {"time": ("lag", v, "s")}, tried=lambda d: _halves(2.0 * d.update), order=4, smoothed=_lag_of_steps
     )
 
 

@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter, Signal, State
 
-from ...batch import Observer
+from ...batch import Batch, Observer
 from ..between import far, finer, joined, straight
 from ..catalogue.actuators import ACTUATORS
 from ..compiling import compiled, ordered
@@ -173,7 +173,9 @@ class Predictor:
         step = model.sample_time / self.fine
         substeps = max(1, int(np.ceil(step * fastest / MAX_TURN)), -(-MIN_STEPS // (update * self.fine)), -(-model.substeps // self.fine))
         way = "linear" if smooth else "cubic" if moves else "held" if any(r.held for r in records) else "linear"
+        self._causal = causal
         self.batch = compiled(anonymous(replace(model, method="rk4", interpolation=way, substeps=substeps, sample_time=step)), causal)
+        self.stepped = way == "held" and len(model.inputs) == 1  # the input moves in steps, unless an actuator smooths it
         self.steps = sum(map(len, records)) * self.fine * substeps  # of the integration in all recordings
         self.n_z = len(records[0].y[0])  # sensors that were measured; the model may have more
 
@@ -195,7 +197,7 @@ class Predictor:
             gain = by.gain / self._scales(parameters)
             wide = np.zeros((*gain.shape[:-1], len(self.model.sensors)))
             wide[..., : self.n_z] = gain
-            run = self.batch.run(
+            run = self._batch(free).run(
                 u,
                 x0=start,
                 parameters=parameters,
@@ -217,9 +219,17 @@ class Predictor:
         found = []
         for e in range(len(self.records)):
             start, parameters, u, _ = self._given(e, free, np.zeros((1, len(free))))
-            run = self.batch.run(self._finer(e, u), x0=start, parameters=parameters, set_name=self.set_name, every=self.fine)
+            run = self._batch(free).run(self._finer(e, u), x0=start, parameters=parameters, set_name=self.set_name, every=self.fine)
             found.append(run.z[0, :, : self.n_z])
         return found
+
+    def _batch(self, free: Sequence[Free]) -> Batch:
+        """The compiled model; with straight lines between the rows of an input that moves in steps but is smoothed by an actuator."""
+        return self._lines if self.stepped and any(map(_smoothed, free)) else self.batch
+
+    @cached_property
+    def _lines(self) -> Batch:
+        return compiled(replace(self.batch.model, interpolation="linear"), self._causal)
 
     def _scales(self, parameters: Mapping[str, Array]) -> Array:
         """Scales of sensors, [1, n_z] or [runs, 1, n_z]. Filters are for sensors of scale 1: without this a fitted scale would tune
@@ -290,7 +300,9 @@ class Predictor:
                 u[:, :, f.target[1]] += values[:, None] * f.target[2].signals[e]
             else:
                 u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
-                u[:, :, f.target[1]] = ACTUATORS[f.target[0]].output(u[:, :, f.target[1]], values, record.step)
+                actuator = ACTUATORS[f.target[0]]
+                output = (self.stepped and actuator.smoothed) or actuator.output
+                u[:, :, f.target[1]] = output(u[:, :, f.target[1]], values, record.step)
         return np.clip(np.nan_to_num(start), -MAX_INNOVATION, MAX_INNOVATION), parameters, u, y
 
 
@@ -303,6 +315,11 @@ def moved(x: Array, samples: Array) -> Array:
 def _order(f: Free) -> int:
     """Place of a free value in the row in which those of one input act."""
     return ACTUATORS[f.target[0]].order if f.target[0] in ACTUATORS else 0
+
+
+def _smoothed(f: Free) -> bool:
+    """Is it the value of an actuator that smooths its input?"""
+    return f.target[0] in ACTUATORS and ACTUATORS[f.target[0]].smoothed is not None
 
 
 def earlier(y: Array, samples: Array) -> Array:
