@@ -75,7 +75,7 @@ def conclude(case: Case, study: Study, found: real.Answer, broken: Broken) -> En
     after = tuple(measuring.started(extended, e, study)[1] for e in study.experiments)
     fit = replace(study.null, simulated=after)
     noisy = not found.terms and _quiet(study, after, found.found.bench.noise)  # then the noise of the null fit is that of the sensors
-    measured = study if noisy else _measured(study, found.found.bench.noise)
+    measured = study if noisy else _measured(study, _most(study, found.found.bench.noise))
     faults = tuple(broken(fit))
     judged = _judged(study, measured, found, after, faults)
     written, withheld = Written.of(case, measured, text, extended, others.lost(judged.causes)), found.withheld
@@ -183,13 +183,18 @@ def _taken(study: Study, after: Sequence[Array]) -> float:
 def _quiet(study: Study, after: Sequence[Array], noise: Array) -> bool:
     """Does a simulation leave nothing but noise, tones aside: what the file states of a sensor, or else that of its samples [n_z], and
     noise of the inputs as it reaches the sensor?"""
-    stated = np.array([s.noise for s in study.model.sensors])
-    most = np.hypot(np.where(stated > 0.0, stated, noise), np.sqrt(residual.driven(study)))
+    most = np.hypot(_most(study, noise), np.sqrt(residual.driven(study)))
     return leftover.within(study, after, most) and not leftover.left_over(study, after)
 
 
+def _most(study: Study, noise: Array) -> Array:
+    """Noise [n_z] of sensors: what the file states, or else that of samples, which show less of coloured noise."""
+    stated = np.array([s.noise for s in study.model.sensors])
+    return np.where(stated > 0.0, stated, noise)
+
+
 def _measured(study: Study, noise: Array) -> Study:
-    """The study with no more noise than samples have [n_z]: that of its null fit has in it what the model misses."""
+    """The study with this noise [n_z] of its sensors: that of its null fit has in it what the model misses."""
     levels = tuple(np.tile(noise**2, (len(x), 1)) for x in study.levels)
     experiments = tuple(replace(e, quiet=np.full_like(e.quiet, np.nan)) for e in study.experiments)
     return replace(study, levels=levels, experiments=experiments)

@@ -27,12 +27,13 @@ SPAN = 0.5**0.5 / LOSS  # up to the ratio from which on there is no resonance
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
     """See Kind."""
-    if place.role != "body" and not (GROUND in place.ends and any(b.name in place.ends for b in model.bodies)):
+    bodies = [b.name for b in model.bodies if b.name in place.ends]
+    if place.role != "body" and not (GROUND in place.ends and bodies):
         return
     for ratio in RATIOS:
         omega = ratio * motion.v_rms / motion.s_rms
         part = Part("tuned_mass", ("mass", "kg"), {"omega": (omega, "1/s"), "loss": (LOSS, "1")}, 1, span=SPAN)
-        yield Form(KINDS[0], place.name, "force", index, (part,))
+        yield Form(KINDS[0], bodies[0] if bodies else place.name, "force", index, (part,))
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

@@ -87,12 +87,12 @@ class Gains:
             f, total = once @ f, once @ total @ once.T + noise
         return f, total
 
-    def driven(self, updates: int) -> Array:
-        """Variance [n_z] that noise of the inputs has in means of the sensors between updates, so many updates into a free run."""
-        n_x = len(self.plant.a)
-        f, total = self._of_an_update(self.plant.a, np.zeros((n_x, n_x)))
+    def driven(self, samples: int) -> Array:
+        """Variance [n_z] that white noise of the inputs has in the sensors, so many samples into a free run."""
+        n_x, sample = len(self.plant.a), replace(self, period=self.period / self.samples, samples=1)
+        f, total = sample._of_an_update(self.plant.a, np.zeros((n_x, n_x)))
         over, covariance = f[:n_x, :n_x], total[:n_x, :n_x]
-        for _ in range(int(np.log2(max(updates, 1)))):  # each doubles the time
+        for _ in range(int(np.log2(max(samples, 1)))):  # each doubles the time
             covariance, over = covariance + over @ covariance @ over.T, over @ over
         return np.diag(f[n_x:, :n_x] @ covariance @ f[n_x:, :n_x].T + total[n_x:, n_x:])
 
