@@ -17,7 +17,7 @@ from .propose import FREE_RUN
 from .reconsider import centred, reconsidered
 from .rounds import LEVEL_FACTORS, MIN_FORM, Accepted, Grown, Rounds, is_large, name_of, terms_of
 from .terms import Term
-from .worth import Z_95, least, mostly, remaining
+from .worth import RATIO, Z_95, least, mostly, remaining
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +79,10 @@ def _own_names(end: Grown) -> list[bool]:
 
 def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
     """The end of a search, with those forms large that have a name beside the unmodelled `level` that remains. One too small for that
-    counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it. Where
-    nothing remains, every force that held-out blocks require is large."""
+    counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it. A force
+    that held-out blocks require is large where next to nothing remains beside it, RATIO times RATIO times less."""
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
-    needed = [level == 0.0 and a.trial.form.how == "force" for a in end.accepted]
+    needed = [a.trial.form.how == "force" and a.trial.share >= RATIO**2 * level for a in end.accepted]
     accepted, large = (
         list(end.accepted),
         [n or is_large(a.trial, least(level, a.trial.whole)) for n, a in zip(needed, end.accepted, strict=True)],

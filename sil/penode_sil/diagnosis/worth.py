@@ -17,6 +17,7 @@ from .catalogue.actuators import ACTUATORS
 from .catalogue.form import Motion
 from .evidence.bench import UPDATES, Bench
 from .evidence.fit import Fit
+from .evidence.samples import KNOWN
 from .terms import Term, drive, moves
 
 Array = NDArray[np.float64]
@@ -26,7 +27,6 @@ RIGHT = 0.93
 BENT = 0.6  # of a friction or a cube along a Gaussian motion is beside a straight line, in rms: sqrt(1 - 2/pi), sqrt(1 - 9/15)
 Z_95 = 1.96  # standard deviations that hold 95 %
 RATIO = 3.0  # times the unmodelled force that remains beside all causes: where that is little, a name is worth it from less on
-LESS = 1.2  # times the noise of its samples that a file states, from which on that noise is coloured
 SYSTEMATIC = 0.007  # of the force there: what mis-modelling of 3.5 % does to a form's size, like it to 0.2 in rms, one direction of 25
 LINEAR = {"linear_spring": "s", "linear_damper": "v"}  # laws that a refit of their parameter makes as large as they have to be
 ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
@@ -49,23 +49,23 @@ def wrong(level: float) -> float:
 
 
 def remaining(bench: Bench, run: Fit, stated: Array) -> float:
-    """The unmodelled level beside all that was found, for `least` and `systematic`: that of the bench, or the largest share of a sensor's
-    rms by which a free `run` misses it beyond noise, if that is more. In a free run a small force that lasts shows, which an observer
-    follows. Of white noise the means between updates have the less; of coloured noise [n_z], no more than is `stated`; noise of the inputs
+    """The unmodelled level beside all that was found, for `least` and `systematic`: none where a free `run` misses no sensor by more than
+    noise; else that of the bench, or the largest share of a sensor's rms by which it does, if that is more. In a free run a small force
+    that lasts shows, which an observer follows. Of white noise the means between updates have the less; of coloured noise [n_z], no more than is `stated`; noise of the inputs
     counts as it reaches the sensors at a sample, for its colour is not stated."""
-    coloured = (bench.colour is not None and len(bench.colour.taps) > 0) | (stated > LESS * bench.noise)
+    coloured = (bench.colour is not None and len(bench.colour.taps) > 0) | (stated > KNOWN * bench.noise)
     floor = np.where(coloured, np.maximum(stated, bench.noise) ** 2, bench.noise**2 / bench.update)
     floor = floor + bench.gains().driven(max(map(len, bench.records)))
     predictor = bench.problem().predictor
     nu = np.concatenate(predictor.predict(run.free, np.zeros((1, len(run.free))), run.by)[0].nu, axis=1)[0]
     signals = [np.concatenate([r.y[:, j] for r in bench.records]) for j in range(len(floor))]
-    shares = [bench.level.size]
+    shares = [0.0]
     for x, y, noise in zip(nu.T, signals, floor, strict=True):
         x, power = x[np.isfinite(x)], float(np.nanvar(y)) if np.isfinite(y).any() else 0.0
         if len(x) and power > 0.0:
-            beyond = float(np.mean(x**2)) - noise * (1.0 + 3.0 * np.sqrt(2.0 / len(x)))
+            beyond = float(np.mean(x**2)) - noise * (KNOWN**2 + 3.0 * np.sqrt(2.0 / len(x)))
             shares.append(float(np.sqrt(max(beyond, 0.0) / power)))
-    return max(shares)
+    return max(bench.level.size, *shares) if any(shares) else 0.0
 
 
 def mostly(taken: float) -> bool:
