@@ -20,7 +20,7 @@ PARAMETERS = {  # what each number of a report means
         "damping_ratio": "of the hidden body",
     }
 }
-RATIOS = (0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.2, 3.2, 5.0)  # of v_rms/s_rms, to which its frequency is tried
+RATIOS = (0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.6, 2.2, 3.2, 5.0, 8.0, 13.0)  # of v_rms/s_rms, to which its frequency is tried
 LOSS = 0.1  # damping ratio at first
 SPAN = 0.5**0.5 / LOSS  # up to the ratio from which on there is no resonance
 
