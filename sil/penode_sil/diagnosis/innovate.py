@@ -40,6 +40,11 @@ class Found:
         return self.end.bench
 
     @property
+    def possible(self) -> float:
+        """The level that may remain where a free run shows none, for what no innovations alone require: parameters, offsets."""
+        return max(self.level, self.bench.level.size)
+
+    @property
     def terms(self) -> list[Term]:
         """All terms in it."""
         return terms_of(self.end.accepted)

@@ -47,14 +47,14 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
         if p.name not in whole or np.isinf(p.tolerance):
             continue
         size, value, beside, unit = shift(model, found.plain, moved, p.name), plain.value(p.name), whole[p.name], units.si(p.unit)
-        bent = systematic(found.level)
+        bent = systematic(found.possible)
         sd = float(np.hypot(plain.deviation(p.name), bent / max(size, bent, 1e-300) * abs(value - p.value)))
         log(f"{p.name}: {value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of the force there")
         if abs(value - p.value) <= _limit(p) * abs(p.value) + Z_95 * sd:
             continue
         if p.name in shared and not straight.off(p.value, value, shared[p.name], _limit(p)):
             notes.append(f"{p.name} is {value:.4g} {unit} together with the cause found at its place, which has a linear part too")
-        elif size < least(found.level, 0.0):
+        elif size < least(found.possible, 0.0):
             notes.append(
                 f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than unmodelled effects can"
             )

@@ -126,7 +126,7 @@ def answer(
         withheld.append(_cause(model, after, moved, a.terms[0], a.trial.share, (), sure, found.level))
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
     shifts = np.full(len(noise), np.inf) if any(c.kind in stopped for c in causes) else offsets_of.shifts(after, found.run, found.terms)
-    biased, remarks = offsets_of.named(model, after, max(found.level, after.level.size), shifts)
+    biased, remarks = offsets_of.named(model, after, found.possible, shifts)
     notes += [*judged.notes, *remarks]
     run = found.run
     offsets = [s.name for s in model.sensors if any(f.target == bias(s.name) for f in run.free)]

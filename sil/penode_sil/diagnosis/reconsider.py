@@ -76,10 +76,10 @@ def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
     """Drops each doubtful form that the others make unnecessary, or exchanges it for one that is simpler or predicts better beside them;
     then resumes the search, and keeps the new end if that loses no more than what was dropped or simplified may. Doubtful are large forms
     other than the last: all of them if a trial that was not accepted would take most of what is still missed, else those preferred to a
-    simpler form of the same curve. After an exchange the last form is checked too."""
+    simpler form of the same curve, or of a curve of which a place has one. After an exchange the last form is checked too."""
     found, whole, loss = list(grown.accepted), _total(grown), 0.0
     missed = any(mostly(t.whole) for t in grown.rest)
-    doubted = [a for a, big in zip(found[:-1], grown.large[:-1], strict=True) if big and (missed or _has_simpler(a))]
+    doubted = [a for a, big in zip(found[:-1], grown.large[:-1], strict=True) if big and (missed or _has_other(a))]
     last = found[-1:] if found and grown.large[-1] else []
     while doubted:
         a = doubted.pop(0)
@@ -109,10 +109,11 @@ def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
     return end if _total(end) >= _total(grown) - loss else grown
 
 
-def _has_simpler(a: Accepted) -> bool:
-    """Was a form preferred to one of another name, of the same curve, with fewer values?"""
+def _has_other(a: Accepted) -> bool:
+    """Was a form preferred to one of another name, of the same curve, with fewer values; or is it of a curve of which a place has one, so
+    that no other form of that was tried beside what came later?"""
     others = [t for t in a.trials if of_curve(t) == of_curve(a.trial) and name_of(t) != name_of(a.trial)]
-    return any(len(t.term.free) < len(a.trial.term.free) for t in others)
+    return any(len(t.term.free) < len(a.trial.term.free) for t in others) or catalogue.is_one(a.trial.form.kind)
 
 
 def _score(t: Trial) -> float:

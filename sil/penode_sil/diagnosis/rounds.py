@@ -205,7 +205,7 @@ def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Tri
     same = [t for t in trials if of_curve(t) == of_curve(best)]
     found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
     for t in more:
-        better, share = t.blocks - found.blocks, max(wrong(t.level.size), MIN_FORM) if is_part(found.form, t.form) else 1.0
+        better, share = t.blocks - found.blocks, wrong(t.level.size) if is_part(found.form, t.form) else 1.0
         if np.all(better > 0.0) and np.sum(better) > margin(found, base, share):
             found = t
     return found

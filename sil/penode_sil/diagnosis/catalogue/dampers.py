@@ -22,7 +22,11 @@ MEANING = {
     "damper_fading": "A damper that loses damping in the course of the recording, with time or with the heat of its own work.",
 }
 PARAMETERS = {  # what each number of a report means
-    "asymmetric_damper": {"rebound": "slope of the whole damper in rebound", "compression": "slope of the whole damper in compression"},
+    "asymmetric_damper": {
+        "rebound": "slope of the whole damper in rebound",
+        "compression": "slope of the whole damper in compression",
+        "quadratic": "extra force quadratic v^2",
+    },
     "degressive_damper": {
         "knee": "rate of the bend",
         "low_rate_damping": "slope of the whole damper below the knee",
@@ -57,6 +61,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     if place.role != "force":
         return
     yield Form(KINDS[0], place.loss, "force", index, (Part("rebound_damper", ("damping", "N*s/m")),))
+    yield Form(KINDS[0], place.loss, "force", index, (Part("quadratic*v^2", ("quadratic", "N*s^2/m^2")),), "bent")
     for share in KNEES:
         bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1, span=share / friction.WIDEST)
         yield Form(KINDS[1], place.loss, "force", index, (bent,))
@@ -81,6 +86,8 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     """See Kind."""
     own = v.nominal("linear_damper", "damping")
     match form.kind:
+        case "asymmetric_damper" if form.note:
+            return {"quadratic": ("N*s^2/m^2", v(0, "quadratic"))}
         case "asymmetric_damper":
             return {"rebound": ("N*s/m", own + v(0, "damping")), "compression": ("N*s/m", own)}
         case "degressive_damper":

@@ -17,7 +17,7 @@ MEANING = {
 }
 PARAMETERS = {  # what each number of a report means
     "cubic_spring": {"cubic": "extra force cubic s^3", "bend": "extra force bend s abs(s)"},
-    "asymmetric_spring": {"difference": "stiffness in compression less that in rebound"},
+    "asymmetric_spring": {"difference": "stiffness in compression less that in rebound", "quadratic": "extra force quadratic s^2"},
     "bump_stop": {"gap": "travel to the contact, positive on either side", "stiffness": "in contact, in addition to the spring"},
 }
 RIVALS = {
@@ -35,6 +35,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     yield Form(KINDS[0], place.name, "force", index, (Part("cubic_spring", ("cubic", "N/m^3")),))
     yield Form(KINDS[0], place.name, "force", index, (Part("bend*s*abs(s)", ("bend", "N/m^2")),), "odd square")
     yield Form(KINDS[1], place.name, "force", index, (Part("asymmetric_spring", ("stiffness", "N/m")),))
+    yield Form(KINDS[1], place.name, "force", index, (Part("quadratic*s^2", ("quadratic", "N/m^2")),), "bent")
     for share in GAPS:
         gap = {"gap": (share * motion.s_reach, "m")}
         yield Form(
@@ -53,5 +54,5 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     if form.kind == KINDS[0]:
         return {"bend": ("N/m^2", v(0, "bend"))} if form.note else {"cubic": ("N/m^3", v(0, "cubic"))}
     if form.kind == KINDS[1]:
-        return {"difference": ("N/m", -v(0, "stiffness"))}
+        return {"quadratic": ("N/m^2", v(0, "quadratic"))} if form.note else {"difference": ("N/m", -v(0, "stiffness"))}
     return {"gap": ("m", v(0, "gap")), "stiffness": ("N/m", v(0, "stiffness"))}
