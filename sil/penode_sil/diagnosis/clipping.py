@@ -14,30 +14,26 @@ from penode_gen.model import Model, Parameter
 
 from .catalogue.form import Form
 from .evidence.bench import FAR, Bench
-from .evidence.fit import likelihood
 from .evidence.screening import Score, as_they_are
 from .fit import Free
 
 Array = NDArray[np.float64]
 KIND = "sensor_clipping"
 SHARES = (0.98, 0.94, 0.88, 0.8, 0.7)  # quantiles of abs(y) that are tried as limits
-MOST = 0.998  # share of the samples that are within a limit, bursts aside
 SOFT = "soft"  # note on a form that comes near its limit smoothly
 TINY = 1e-9  # of the limit, which has a logarithm
-SHARP, BLUNT = 4.0, 2.0  # its exponent at first, and the least: 2.6 is about a tanh; a limit that cuts off where it is large
-TOPS = (1.05, 1.2)  # and shares of the largest sample: a sensor that saturates softly shows none at its limit
+SHARP = 4.0  # its exponent at first, and twice the least: 2.6 is about a tanh; a limit that cuts off where it is large
 
 
 def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score, Form]]:
-    """The limit that gains most for a sensor, and the soft one that does; none for one that was not measured, or hardly moves. A free run,
-    `seen` [n, n_z] for each recording, replaces the signal that is not cut off; the part beyond a limit is the change of the innovations.
-    Before any form is accepted, and if the largest 2 % of the samples agree within three standard deviations of noise, limits are tried
-    with the nominal parameters too."""
+    """The limit that gains most for a sensor, and a soft one above its largest sample, for such a limit shows none at it; none for one that
+    was not measured, or hardly moves. A free run, `seen` [n, n_z] for each recording, replaces the signal that is not cut off; what is
+    beyond a limit is the change of the innovations."""
     y = np.abs(np.concatenate([r.y[:, index] for r in bench.records]))
     y = y[np.isfinite(y)]
     if not np.any(y > 0.0):
         return []
-    limits = [float(x) for x in (*np.quantile(y, SHARES), *(top * np.max(y) for top in TOPS)) if x > 0.0]
+    limits = [float(x) for x in (*np.quantile(y, SHARES), 1.1 * np.max(y)) if x > 0.0]
 
     def gained(sizes: Sequence[float], sharp: float) -> list[float]:
         changes = []
@@ -47,11 +43,8 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score
             changes.append(change)
         return [s.gain for s in as_they_are(bench.fit, changes)]
 
-    gains, soft = gained(limits, np.inf), limits[len(SHARES) :]
-    if len(bench.nominal) == len(bench.fit.free) and _largest(bench, index) - np.quantile(y, SHARES[0]) < 3.0 * bench.noise[index]:
-        gains = [max(pair) for pair in zip(gains, _gains_of_nominal(bench, index, limits), strict=True)]
-    found = []
-    for each, sizes, note in ((gains, limits, ""), (gained(soft, SHARP), soft, SOFT)):
+    found, soft = [], limits[-1:]
+    for each, sizes, note in ((gained(limits, np.inf), limits, ""), (gained(soft, SHARP), soft, SOFT)):
         best = int(np.argmax(each))
         form = Form(KIND, bench.model.sensors[index].name, "clip", index, note=note, limit=sizes[best])
         found.append((Score(each[best], np.ones(1 + bool(note))), form))
@@ -61,17 +54,6 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score
 def _cut(x: Array, limit: float, sharp: float) -> Array:
     """A signal behind a limit; `sharp`: infinite for one that cuts off."""
     return np.clip(x, -limit, limit) if np.isinf(sharp) else x / (1.0 + np.abs(x / limit) ** sharp) ** (1.0 / sharp)
-
-
-def _gains_of_nominal(bench: Bench, index: int, limits: Sequence[float]) -> list[float]:
-    """Log likelihood gained by each limit of a sensor with nominal parameters: those fitted to clipped data give too little motion."""
-    form = Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[0])
-    model, (limit,) = limited(bench.model, form, "x0_0")
-    problem, free = bench.problem(model), (*bench.nominal, limit)
-    shifts = np.zeros((len(limits), len(free)))
-    shifts[:, -1] = np.log(np.array(limits) / limits[0])
-    nu = problem.nu(free, shifts, bench.fit.by)
-    return [likelihood(n, np.isfinite(n), problem.floor)[1] - bench.fit.likelihood for n in nu]
 
 
 def limited(model: Model, form: Form, stem: str) -> tuple[Model, tuple[Free, ...]]:
@@ -84,7 +66,7 @@ def limited(model: Model, form: Form, stem: str) -> tuple[Model, tuple[Free, ...
     free = [Free(name, form.limit, form.limit, log=True, sigma=1.0, origin=form.limit)]
     if form.note:
         parameters[sharp] = Parameter(sharp, SHARP, "1")
-        free.append(Free(sharp, SHARP, SHARP, log=True, sigma=1.0, origin=SHARP, low=BLUNT))
+        free.append(Free(sharp, SHARP, SHARP, log=True, sigma=1.0, origin=SHARP, low=0.5 * SHARP))
     return replace(model, parameters=parameters, sensors=sensors), tuple(free)
 
 
@@ -102,7 +84,7 @@ def is_possible(bench: Bench, form: Form, limit: float) -> bool:
 
 def _largest(bench: Bench, index: int) -> float:
     """What hardly any sample of a sensor exceeds."""
-    return float(np.nanquantile(np.abs(np.concatenate([r.y[:, index] for r in bench.records])), MOST))
+    return float(np.nanquantile(np.abs(np.concatenate([r.y[:, index] for r in bench.records])), 0.998))
 
 
 def share(bench: Bench, form: Form, limit: Free, sharp: float = np.inf) -> float:

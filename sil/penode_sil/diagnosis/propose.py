@@ -28,8 +28,6 @@ Array = NDArray[np.float64]
 TRIED = 6  # forms that are fitted in a round, the best of each name and place first; and the best of every other place
 PROMISE = 3.0  # log likelihood that a form has to promise for it
 SMALL = 0.02  # of the force at a place: a force that is put on to see what it does, and a law's start
-LITTLE = 0.4  # of a unit, which is 0.05 of the force at the place
-GUESSED_DEVIATION = 0.5  # standard deviation of the logarithm of a parameter above which it counts as a guess
 FREE_RUN, FOLLOWED = 10, 12  # iterations of a form's fits
 
 
@@ -226,8 +224,8 @@ def _fitted(
     n_x = len(wide.states)
     by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))
     starts, runs = [start or (*bench.fit.free, *_sized(term, sizes))], []
-    if not start and (term.form.how == "clip" or any(f.log and f.sigma > GUESSED_DEVIATION for f in bench.nominal)):
-        most = [LITTLE * f.unit for f in term.free if not f.log]
+    if not start and (term.form.how == "clip" or any(f.log for f in bench.nominal)):
+        most = [SMALL * f.sigma for f in term.free if not f.log]
         little = np.clip(sizes[: len(most)], *np.outer((-1.0, 1.0), most))
         own = {f.target for f in bench.nominal}
         nominal = (*bench.nominal, *(f for f in bench.fit.free if f.target not in own))
@@ -254,8 +252,8 @@ def _from_part(
     of_part = {f.target: f.value for f in part.fit.free}
     own = [f for f in part.fit.free if f.target not in {x.target for x in part.term.free}]
     for name, p in zip(t.term.elements, t.form.parts, strict=True):
-        known = laws.get(p.law, name)
-        own += [replace(f, value=of_part.get(f.target.replace(name, known), f.value)) for f in t.term.free if f.target.startswith(f"{name}_")]
+        known, values = laws.get(p.law, name), [f for f in t.term.free if f.target.startswith(f"{name}_")]
+        own += [replace(f, value=of_part.get(f.target.replace(name, known), f.value)) for f in values]
     again = _fitted(bench, base, wide, moved, terms, t.term, np.zeros(0), own)
     return max(t, again, key=lambda x: x.gain)
 

@@ -13,7 +13,8 @@ from ..recordings.measured import Measured
 
 OUTSIDE = "outside_taxonomy"  # kind of an effect without a name
 EXTENDED = "model_extended.toml"
-SIZES = {"force", "stiffness", "damping", "mass", "bias", "offset", "delay", "lag", "coefficient", "cubic", "quadratic", "difference", "scale", "gain"}
+SIZES = {"force", "stiffness", "damping", "mass", "bias", "offset", "delay", "lag", "scale", "gain"}
+SIZES |= {"coefficient", "cubic", "quadratic", "difference"}  # of curves
 NOTHING = {"scale": 1.0, "gain": 1.0}  # sizes without any effect; 0 for others
 MAY_BE_NOTHING = "may be nothing, by the 95 % interval of its size; not named, but in model_extended.toml"
 

@@ -223,7 +223,7 @@ def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, quiet:
 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:
     """Causes, without parameters where several have left tolerances that the file states: alone that is another plant, beside other causes
-    these are not quite of their textbook form; and a note on it. All by one factor, they are the gain of an input that the file does not have."""
+    these are not quite of their textbook form; and a note on it. All by one factor, they are the gain of an input that the file lacks."""
     off = [c for c in causes if of_values.is_one(c) and model.parameters[c.where].tolerance <= 1.0]
     if len(off) < 2:
         return causes, []
@@ -236,5 +236,5 @@ def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ..
     if len(stated) < 2:
         return causes, []
     if others_named := tuple(c for c in causes if c not in off):
-        return others_named, [f"{', '.join(stated)} are outside of their tolerances: they make up for curves that are not quite those named"]
+        return others_named, [f"{', '.join(stated)} are out of tolerance: they make up for curves that are not quite those named"]
     return (), [f"{', '.join(stated)} would all have to be outside of their tolerances: another plant, or dynamics that the model lacks"]

@@ -51,8 +51,8 @@ def wrong(level: float) -> float:
 def remaining(bench: Bench, run: Fit, stated: Array) -> float:
     """The unmodelled level beside all that was found, for `least` and `systematic`: none where a free `run` misses no sensor by more than
     noise; else that of the bench, or the largest share of a sensor's rms by which it does, if that is more. In a free run a small force
-    that lasts shows, which an observer follows. Of white noise the means between updates have the less; of coloured noise [n_z], no more than is `stated`; noise of the inputs
-    counts as it reaches the sensors at a sample, for its colour is not stated."""
+    that lasts shows, which an observer follows. Of white noise the means between updates have the less; of coloured noise [n_z], no more
+    than is `stated`; noise of the inputs counts as it reaches the sensors at a sample, for its colour is not stated."""
     coloured = (bench.colour is not None and len(bench.colour.taps) > 0) | (stated > KNOWN * bench.noise)
     floor = np.where(coloured, np.maximum(stated, bench.noise) ** 2, bench.noise**2 / bench.update)
     floor = floor + bench.gains().driven(max(map(len, bench.records)))

@@ -63,8 +63,8 @@ class Actuator:
     [runs]; `fitted`: how its value is fitted, and `tried`: values that a score test compares, where the effect is not proportional to
     it; `small`: it is about so where they are small; `size`: name and unit in a report ("": the unit of the input, "/s" behind it), and
     `shown` that for a value; `law` of [actuators] that does the same, empty if there is none, and its `entry` for a value; `order` of
-    actuators in series, as in the model file; `by_change`: the value alone does not say how much of the input it changes; `between`: how the
-    output moves between rows where the input is held between them, in "steps" or as a "line", and `smoothed` that output."""
+    actuators in series, as in the model file; `by_change`: the value alone does not say how much of the input it changes;
+    `between`: how the output moves between rows where the input is held, in "steps" or as a "line", and `smoothed` that output."""
 
     output: Callable[[Array, Array, float], Array]
     fitted: Callable[[Drive], Value]
