@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from samples import sample
+from scipy.linalg import expm
 
 from penode_sil.cli import cli
 
@@ -98,9 +99,14 @@ def run(path, acts, force, mass, size, columns, seed):
 
 def diagnosed(folder, text, acts, force, mass, size, columns):
     """What the command says of one recording, with another one to measure the gain on."""
-    (folder / "model.toml").write_text(text)
     for seed, name in ((1, "train.csv"), (2, "hold.csv")):
         run(folder / name, acts, force, mass, size, columns, seed)
+    return found(folder, text)
+
+
+def found(folder, text):
+    """What it says of the recordings in a folder."""
+    (folder / "model.toml").write_text(text)
     call = ["diagnose", str(folder / "model.toml"), "--data", str(folder / "train.csv"), "--holdout", str(folder / "hold.csv")]
     done = CliRunner().invoke(cli, [*call, "-o", str(folder / "out")])
     assert done.exit_code == 0, done.output
@@ -145,6 +151,37 @@ def test_a_bent_actuator_is_named(tmp_path, acts, kind, key, true, near, show):
     assert [(c["kind"], c["where"]) for c in d["causes"]] == [(kind, "push")]
     assert abs(d["causes"][0]["parameters"][key]["value"] / true - 1.0) < near
     assert all(g["after_rmse"] < 0.5 * g["before_rmse"] for g in d["gain"].values())
+
+
+def commanded(path, lag, delay, seed):
+    """A recording of 6 s of the slide under a command that is held from row to row and reaches it behind a lag, so many quarters of a row
+    late: exact, for the command is constant in each quarter."""
+    n, size, quarter = int(6.0 / STEP), 4, STEP / 4
+    u = tones(n * FINE, 15.0, seed)[::FINE]
+    reaches = np.concatenate([np.full(delay, u[0]), np.repeat(u, 4)])[: 4 * n]
+    whole = np.zeros((size, size))  # of x, v, the force, the command
+    whole[0, 1], whole[1, :3], whole[2, 2:] = 1.0, (-400.0, -6.0, 0.5), (-1.0 / lag, 1.0 / lag)
+    over, state, rows = expm(whole * quarter), np.array([0.0, 0.0, u[0], 0.0]), []
+    for i, command in enumerate(reaches):
+        state[3] = command
+        if i % 4 == 0:
+            rows.append((state[0], whole[1] @ state))
+        state = over @ state
+    rng = np.random.default_rng(seed + 100)
+    seen = np.array(rows) + np.array([2e-5, 0.05]) * rng.standard_normal((n, 2))
+    np.savetxt(path, np.column_stack([STEP * np.arange(n), u, seen]), "%.9g", ",", header="time [s],push [N],x [m],a [m/s^2]", comments="")
+
+
+@pytest.mark.parametrize("lag, delay, kind, key", [(0.018, 0, "input_lag", "lag"), (1e-5, 11, "input_delay", "delay")])
+def test_an_accelerometer_shows_what_a_held_command_does_between_rows(tmp_path, lag, delay, kind, key, show):
+    """And is not late itself; a lag to a tenth of a row, a delay, which the model file has in rows, to half a row."""
+    text = SLIDE.replace('"2 ms"', '"2 ms"\ninput = "held"')
+    for seed, name in ((1, "train.csv"), (2, "hold.csv")):
+        commanded(tmp_path / name, lag, delay, seed)
+    d = found(tmp_path, text)
+    show([(c["kind"], c["where"], c["parameters"]) for c in d["causes"]])
+    assert [(c["kind"], c["where"]) for c in d["causes"]] == [(kind, "push")]
+    assert abs(d["causes"][0]["parameters"][key]["value"] - max(lag, delay * STEP / 4)) < (0.5 if delay else 0.1) * STEP
 
 
 def rubbed(level, transition):

@@ -34,9 +34,9 @@ def test_a_parameter_is_off_where_no_slope_is_that_of_the_file(own, slopes, off)
     assert straight.off(60.0, own, slopes, 0.05) is off
 
 
-def recording(path, stiffness: float, difference: float, waves: float) -> None:
-    """A mass on a spring that is softer in rebound by `difference`, with a sine of `waves` of its force, under random tones up to 8 Hz:
-    Heun in twentieths of a sample, whose error is (30/s 1e-4 s)^2/12, below 1e-6."""
+def recording(path, stiffness: float, difference: float, waves: float, quadratic: float = 0.0) -> None:
+    """A mass on a spring that is softer in rebound by `difference`, with a sine of `waves` of its force, and a force `quadratic` x^2, under
+    random tones up to 8 Hz: Heun in twentieths of a sample, whose error is (30/s 1e-4 s)^2/12, below 1e-6."""
     rng, n, fine = np.random.default_rng(3), 4000, 20
     tones, phases = rng.uniform(0.3, 8.0, 30), rng.uniform(0.0, 7.0, 30)
     t = np.arange(n * fine + 1) * STEP / fine
@@ -44,7 +44,13 @@ def recording(path, stiffness: float, difference: float, waves: float) -> None:
     h, x, v, seen = STEP / fine, 0.0, 0.0, []
 
     def rate(x, v, force):
-        spring = stiffness * x + 0.5 * difference * (x - abs(x)) - 0.5 * difference * x + waves * stiffness * 0.01 * math.sin(x / 0.004)
+        spring = (
+            stiffness * x
+            + 0.5 * difference * (x - abs(x))
+            - 0.5 * difference * x
+            + waves * stiffness * 0.01 * math.sin(x / 0.004)
+            + quadratic * x * x
+        )
         return (force - DAMPING * v - spring) / MASS
 
     for i in range(n * fine):
@@ -82,3 +88,13 @@ def test_an_asymmetric_spring_about_the_stiffness_of_the_file(tmp_path, penode, 
     assert [c["kind"] for c in found["causes"]] == ["asymmetric_spring"]
     shares = [float(n.split(": ")[1].split("%")[0]) for n in found["notes"] if n.startswith("asymmetric spring at spring is small")]
     assert len(shares) == (difference < 0.1) and all(0.3 * difference < 0.01 * x < 1.2 * difference for x in shares)
+
+
+def test_a_spring_that_is_stiffer_on_one_side_the_farther_it_goes(tmp_path, penode):
+    """A force of k2 x^2: named as an asymmetric spring, with k2 to 3 %; two straight halves would leave a third of it."""
+    (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.03, SENSORS))
+    recording(tmp_path / "train.csv", STIFFNESS, 0.0, 0.0, quadratic=1.5e4)
+    penode("diagnose", tmp_path / "rig.toml", "--data", tmp_path / "train.csv", "-o", tmp_path / "out")
+    (found,) = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["causes"]
+    assert found["kind"] == "asymmetric_spring" and found["where"] == "spring"
+    assert found["parameters"]["quadratic"]["value"] == pytest.approx(1.5e4, rel=0.03)

@@ -16,8 +16,10 @@ from .evidence.observer import Filter, bias
 from .propose import FREE_RUN
 from .reconsider import centred, reconsidered
 from .rounds import LEVEL_FACTORS, MIN_FORM, Accepted, Grown, Rounds, is_large, name_of, terms_of
-from .terms import Term
+from .terms import Term, Trial
 from .worth import RATIO, Z_95, least, mostly, remaining
+
+FINEST = 1e-3  # of a signal: no channel is calibrated better
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +86,10 @@ def _own_names(end: Grown) -> list[bool]:
 
 def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
     """The end of a search, with those forms large that have a name beside the unmodelled `level` that remains. One too small for that
-    counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it. A force
-    that held-out blocks require is large where next to nothing remains beside it, RATIO times RATIO times less."""
+    counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it."""
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
-    needed = [a.trial.form.how == "force" and a.trial.share >= RATIO**2 * level for a in end.accepted]
-    accepted, large = (
-        list(end.accepted),
-        [n or is_large(a.trial, least(level, a.trial.whole)) for n, a in zip(needed, end.accepted, strict=True)],
-    )
+    accepted = list(end.accepted)
+    large = [_is_required(a.trial, level) or is_large(a.trial, _worth(a.trial, level, a.trial.whole)) for a in accepted]
     if all(large):
         return replace(end, large=tuple(large))
     problem = bench.problem()
@@ -106,8 +104,18 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
         log(f"{name_of(a.trial)} explains {taken:.1%} of the error of a free run without it")
         if mostly(taken):
             accepted[k] = replace(a, trial=replace(a.trial, whole=max(taken, a.trial.whole)))
-            large[k] = a.trial.share >= least(level, taken)
+            large[k] = a.trial.share >= _worth(a.trial, level, taken)
     return replace(end, accepted=tuple(accepted), large=tuple(large))
+
+
+def _is_required(t: Trial, level: float) -> bool:
+    """Is it a force beside which next to nothing remains? Held-out blocks have accepted it."""
+    return t.form.how == "force" and t.share >= RATIO**2 * level
+
+
+def _worth(t: Trial, level: float, taken: float) -> float:
+    """The share from which on a form has a name, see `least`: of an input or a sensor no less than FINEST."""
+    return max(least(level, taken), FINEST * (t.form.how != "force"))
 
 
 def _found(rounds: Rounds, end: Grown, worth_naming: Sequence[bool], run: Fit, level: float) -> Found:

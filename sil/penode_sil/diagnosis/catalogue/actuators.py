@@ -64,7 +64,7 @@ class Actuator:
     it; `small`: it is about so where they are small; `size`: name and unit in a report ("": the unit of the input, "/s" behind it), and
     `shown` that for a value; `law` of [actuators] that does the same, empty if there is none, and its `entry` for a value; `order` of
     actuators in series, as in the model file; `by_change`: the value alone does not say how much of the input it changes;
-    `between`: how the output moves between rows where the input is held, in "steps" or as a "line", and `smoothed` that output."""
+    `smoothed`: the output at the rows where the input is held between them, if that moves as a line and not in steps."""
 
     output: Callable[[Array, Array, float], Array]
     fitted: Callable[[Drive], Value]
@@ -76,7 +76,6 @@ class Actuator:
     order: int = 0
     by_change: bool = False
     small: bool = True
-    between: str = ""
     smoothed: Callable[[Array, Array, float], Array] | None = None
 
     def change(self, drive: Drive, value: float) -> float:
@@ -190,7 +189,7 @@ def _behind() -> Actuator:
     def tried(d: Drive) -> Sequence[float]:
         return _halves(2.0 * d.update)
 
-    return Actuator(_lag, _time, ("lag", "s"), law="lag", entry=entry, tried=tried, order=4, between="line", smoothed=_lag_of_steps)
+    return Actuator(_lag, _time, ("lag", "s"), law="lag", entry=entry, tried=tried, order=4, smoothed=_lag_of_steps)
 
 
 def _dead_zone() -> Actuator:
@@ -234,7 +233,7 @@ def _slew_limit() -> Actuator:
 ACTUATORS: dict[str, Actuator] = {
     "input_gain": _gain(),
     "input_offset": _offset(),
-    "input_delay": Actuator(_late, _time, ("delay", "s"), tried=lambda d: [0.5 * d.step * k for k in range(1, 17)], between="steps"),
+    "input_delay": Actuator(_late, _time, ("delay", "s")),
     "input_drift": _drift(),
     "input_lag": _behind(),
     "input_dead_zone": _dead_zone(),

@@ -28,7 +28,6 @@ UNMODELLED = "unmodelled"  # stem of the unmodelled forces and of their states
 MAX_TURN = 0.15  # of a period of the fastest mode, in one step of the integration: Runge-Kutta of order 4 then errs by 1e-4 of it a step
 MOST_STEPS = 50_000  # integration steps, over all recordings, up to which edges are steepened; a fit of a form then takes half a second
 MIN_STEPS = 5  # steps between updates: the edge of a friction, 0.02 of the rms rate wide, then damps less than Runge-Kutta bears
-WITHIN = 4  # steps between rows of an input that moves in steps at the rows, where it is delayed
 MAX_INNOVATION = 1e15  # innovation of a run that left all bounds
 
 
@@ -187,12 +186,12 @@ class Predictor:
         recording, [runs, n, .]; `watched`: how many sensors more to give, per recording [runs, n, watched]. Returns innovations,
         watched sensors, and states per recording [runs, n, n_x]."""
         nus, seen, moved, sane = [], [], [], np.ones(len(shifts), bool)
-        batch, fine = self._twin(free)
+        batch = self._batch(free)
         for e in range(len(self.records)):
             start, parameters, u, y = self._given(e, free, shifts)
             parameters[f"{UNMODELLED}_tau"] = by.tau
             if e in extra:
-                more = joined(straight(extra[e], fine), extra[e])
+                more = joined(straight(extra[e], self.fine), extra[e])
                 u = np.concatenate([np.broadcast_to(u, (len(more), *u.shape[-2:])), more], axis=-1)
             blank = np.full((*y.shape[:-1], len(self.model.sensors) - self.n_z), np.nan)
             gain = by.gain / self._scales(parameters)
@@ -204,7 +203,7 @@ class Predictor:
                 parameters=parameters,
                 set_name=self.set_name,
                 states=states,
-                every=fine,
+                every=self.fine,
                 observer=Observer(self.update, np.concatenate([y, blank], axis=-1), wide),
             )
             z = run.z
@@ -217,27 +216,21 @@ class Predictor:
 
     def sensors(self, free: Sequence[Free]) -> list[Array]:
         """The measured sensors in a free run, [n, n_z] per recording."""
-        found, (batch, fine) = [], self._twin(free)
+        found, batch = [], self._batch(free)
         for e in range(len(self.records)):
             start, parameters, u, _ = self._given(e, free, np.zeros((1, len(free))))
-            run = batch.run(u, x0=start, parameters=parameters, set_name=self.set_name, every=fine)
+            run = batch.run(u, x0=start, parameters=parameters, set_name=self.set_name, every=self.fine)
             found.append(run.z[0, :, : self.n_z])
         return found
 
-    def _twin(self, free: Sequence[Free]) -> tuple[Batch, int]:
-        """The compiled model, and how many steps of its input there are to a row. One that moves in steps at the rows: a line between these
-        where an actuator smooths it, WITHIN steps where one delays it, for it then moves between them."""
-        ways = {ACTUATORS[f.target[0]].between for f in free if f.target[0] in ACTUATORS} if self.stepped else set()
-        return (self._steps, WITHIN) if "steps" in ways else (self._lines, 1) if "line" in ways else (self.batch, self.fine)
+    def _batch(self, free: Sequence[Free]) -> Batch:
+        """The compiled model; with straight lines between the rows of an input that moves in steps but is smoothed by an actuator."""
+        smooth = self.stepped and any(f.target[0] in ACTUATORS and ACTUATORS[f.target[0]].smoothed for f in free)
+        return self._lines if smooth else self.batch
 
     @cached_property
     def _lines(self) -> Batch:
         return compiled(replace(self.batch.model, interpolation="linear"), self._causal)
-
-    @cached_property
-    def _steps(self) -> Batch:
-        model = self.batch.model
-        return compiled(replace(model, sample_time=model.sample_time / WITHIN, substeps=-(-model.substeps // WITHIN)), self._causal)
 
     def _scales(self, parameters: Mapping[str, Array]) -> Array:
         """Scales of sensors, [1, n_z] or [runs, 1, n_z]. Filters are for sensors of scale 1: without this a fitted scale would tune
@@ -293,8 +286,6 @@ class Predictor:
         start = np.tile(np.array(self.model.start, dtype=float), (runs, 1))
         parameters: dict[str, Array] = {}
         u, y = record.u, record.y
-        within = self._twin(free)[1] if self.stepped else 1
-        u = np.repeat(u, within, axis=0) if within > 1 else u
         for f, shift in sorted(zip(free, shifts.T, strict=True), key=lambda pair: _order(pair[0])):
             values = f.at(shift)
             if isinstance(f.target, str):
@@ -307,12 +298,12 @@ class Predictor:
                 y[:, :, f.target[1]] = earlier(record.y[:, f.target[1]], values / record.step)
             elif f.target[0] == "input_added":
                 u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
-                u[:, :, f.target[1]] += values[:, None] * np.repeat(f.target[2].signals[e], within)
+                u[:, :, f.target[1]] += values[:, None] * f.target[2].signals[e]
             else:
                 u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
                 actuator = ACTUATORS[f.target[0]]
                 output = (self.stepped and actuator.smoothed) or actuator.output
-                u[:, :, f.target[1]] = output(u[:, :, f.target[1]], values, record.step / within)
+                u[:, :, f.target[1]] = output(u[:, :, f.target[1]], values, record.step)
         return np.clip(np.nan_to_num(start), -MAX_INNOVATION, MAX_INNOVATION), parameters, self._finer(e, u), y
 
 
