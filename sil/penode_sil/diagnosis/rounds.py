@@ -205,8 +205,8 @@ def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Tri
     same = [t for t in trials if of_curve(t) == of_curve(best)]
     found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
     for t in more:
-        better, share = t.blocks - found.blocks, wrong(t.level.size) if is_part(found.form, t.form) else 1.0
-        if np.all(better > 0.0) and np.sum(better) > margin(found, base, share):
+        better, nested = t.blocks - found.blocks, is_part(found.form, t.form) or name_of(t) == name_of(found)
+        if np.all(better > 0.0) and np.sum(better) > margin(found, base, wrong(t.level.size) if nested else 1.0):
             found = t
     return found
 
@@ -220,7 +220,8 @@ def _simplicity(t: Trial, other: Trial) -> float:
 
 def margin(t: Trial, base: Array, share: float = 1.0) -> float:
     """What another form has to gain beyond a trial if it has more values, or another name: a `share` of MIN_FORM of its gain. One that has
-    all laws of the trial, and more, has to gain less where the world is less wrong: waves in other curves look like more laws."""
+    all laws of the trial, and more, or the same name, has to gain less where the world is less wrong: waves in other curves look like more
+    laws."""
     return max(MIN_GAIN, share * MIN_FORM * float(np.sum(t.blocks - base)))
 
 

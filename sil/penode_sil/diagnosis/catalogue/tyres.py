@@ -18,7 +18,11 @@ MEANING = {
     "tyre_nonlinear": "The tyre's stiffness changes with its load.",
 }
 PARAMETERS = {  # what each number of a report means
-    "tyre_damping": {"damping": "of the tyre"},
+    "tyre_damping": {
+        "damping": "of the tyre, at low rates",
+        "knee": "rate at which it is half of that",
+        "relaxation_time": "of its rubber",
+    },
     "tyre_liftoff": {"preload": "load of the tyre at zero deflection, the most that it can lose"},
     "tyre_nonlinear": {"quadratic": "extra load quadratic s^2 when pressed in by s"},
 }
@@ -35,6 +39,10 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     if place.role != "tyre":
         return
     yield Form(KINDS[0], place.name, "force", index, (Part("linear_damper", ("damping", "N*s/m"), {}, 1),))
+    falls = {"knee": (motion.v_rms, "m/s")}  # the loss of rubber grows less than with the rate
+    yield Form(KINDS[0], place.name, "force", index, (Part("damping*v/(1 + abs(v)/knee)", ("damping", "N*s/m"), falls, 1),), "falling")
+    behind = {"relaxation": (2.0 * motion.parts[0].step, "s")}
+    yield Form(KINDS[0], place.name, "force", index, (Part("maxwell_bushing", ("stiffness", "N/m"), behind, 1),), "elastic")
     top = max(float(np.quantile(p.s, 0.9995)) for p in motion.parts)
     for share in SHARES if top > 0.0 else ():
         yield Form(
@@ -47,4 +55,11 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     """See Kind."""
     if form.kind == KINDS[1]:
         return {"preload": ("N", v(0, "stiffness") * v(0, "static"))}
-    return {"damping": ("N*s/m", v(0, "damping"))} if form.kind == KINDS[0] else {"quadratic": ("N/m^2", v(0, "quadratic"))}
+    match form.note:
+        case _ if form.kind == KINDS[2]:
+            return {"quadratic": ("N/m^2", v(0, "quadratic"))}
+        case "falling":
+            return {"damping": ("N*s/m", v(0, "damping")), "knee": ("m/s", v(0, "knee"))}
+        case "elastic":
+            return {"damping": ("N*s/m", v(0, "stiffness") * v(0, "relaxation")), "relaxation_time": ("s", v(0, "relaxation"))}
+    return {"damping": ("N*s/m", v(0, "damping"))}
