@@ -88,8 +88,8 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
     """The end of a search, with those forms large that have a name beside the unmodelled `level` that remains. One too small for that
     counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it."""
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
-    accepted = list(end.accepted)
-    large = [_is_required(a.trial, level) or is_large(a.trial, _worth(a.trial, level, a.trial.whole)) for a in accepted]
+    accepted, most = list(end.accepted), max((a.trial.gain for a in end.accepted), default=0.0)
+    large = [_is_required(a.trial, level, most) or is_large(a.trial, _worth(a.trial, level, a.trial.whole)) for a in accepted]
     if all(large):
         return replace(end, large=tuple(large))
     problem = bench.problem()
@@ -108,9 +108,10 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
     return replace(end, accepted=tuple(accepted), large=tuple(large))
 
 
-def _is_required(t: Trial, level: float) -> bool:
-    """Is it a force beside which next to nothing remains? Held-out blocks have accepted it."""
-    return t.form.how == "force" and t.share >= RATIO**2 * level
+def _is_required(t: Trial, level: float, most: float) -> bool:
+    """Is it a force beside which next to nothing remains? Held-out blocks have accepted it; but where another form gained the `most`, a
+    curve that is off by MIN_FORM from what is there leaves the square of that for others to make up for."""
+    return t.form.how == "force" and t.share >= RATIO**2 * level and t.gain >= MIN_FORM**2 * most
 
 
 def _worth(t: Trial, level: float, taken: float) -> float:
