@@ -111,7 +111,8 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
 def _is_required(t: Trial, level: float, most: float) -> bool:
     """Is it a force beside which next to nothing remains? Held-out blocks have accepted it; but where another form gained the `most`, a
     curve that is off by MIN_FORM from what is there leaves the square of that for others to make up for."""
-    return t.form.how == "force" and t.share >= RATIO**2 * level and t.gain >= MIN_FORM**2 * most
+    share, gain = RATIO**2 * level, MIN_FORM**2 * most
+    return t.form.how == "force" and t.share >= share and t.gain >= gain
 
 
 def _worth(t: Trial, level: float, taken: float) -> float:

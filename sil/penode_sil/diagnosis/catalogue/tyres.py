@@ -56,10 +56,8 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     if form.kind == KINDS[1]:
         return {"preload": ("N", v(0, "stiffness") * v(0, "static"))}
     match form.note:
-        case _ if form.kind == KINDS[2]:
-            return {"quadratic": ("N/m^2", v(0, "quadratic"))}
         case "falling":
             return {"damping": ("N*s/m", v(0, "damping")), "knee": ("m/s", v(0, "knee"))}
         case "elastic":
             return {"damping": ("N*s/m", v(0, "stiffness") * v(0, "relaxation")), "relaxation_time": ("s", v(0, "relaxation"))}
-    return {"damping": ("N*s/m", v(0, "damping"))}
+    return {"damping": ("N*s/m", v(0, "damping"))} if form.kind == KINDS[0] else {"quadratic": ("N/m^2", v(0, "quadratic"))}
