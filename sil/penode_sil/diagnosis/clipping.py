@@ -14,6 +14,7 @@ from penode_gen.model import Model, Parameter
 
 from .catalogue.form import Form
 from .evidence.bench import FAR, Bench
+from .evidence.fit import likelihood
 from .evidence.screening import Score, as_they_are
 from .fit import Free
 
@@ -28,7 +29,8 @@ SHARP = 4.0  # its exponent at first, and twice the least: 2.6 is about a tanh; 
 def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score, Form]]:
     """The limit that gains most for a sensor, and a soft one above its largest sample, for such a limit shows none at it; none for one that
     was not measured, or hardly moves. A free run, `seen` [n, n_z] for each recording, replaces the signal that is not cut off; what is
-    beyond a limit is the change of the innovations."""
+    beyond a limit is the change of the innovations. Before any form is accepted, and if the largest samples agree within noise, limits are
+    tried with the nominal parameters too."""
     y = np.abs(np.concatenate([r.y[:, index] for r in bench.records]))
     y = y[np.isfinite(y)]
     if not np.any(y > 0.0):
@@ -43,8 +45,11 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score
             changes.append(change)
         return [s.gain for s in as_they_are(bench.fit, changes)]
 
-    found, soft = [], limits[-1:]
-    for each, sizes, note in ((gained(limits, np.inf), limits, ""), (gained(soft, SHARP), soft, SOFT)):
+    gains, soft = gained(limits, np.inf), limits[-1:]
+    if len(bench.nominal) == len(bench.fit.free) and _largest(bench, index) - limits[0] < 3.0 * bench.noise[index]:
+        gains = [max(pair) for pair in zip(gains, _gains_of_nominal(bench, index, limits), strict=True)]
+    found = []
+    for each, sizes, note in ((gains, limits, ""), (gained(soft, SHARP), soft, SOFT)):
         best = int(np.argmax(each))
         form = Form(KIND, bench.model.sensors[index].name, "clip", index, note=note, limit=sizes[best])
         found.append((Score(each[best], np.ones(1 + bool(note))), form))
@@ -54,6 +59,17 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score
 def _cut(x: Array, limit: float, sharp: float) -> Array:
     """A signal behind a limit; `sharp`: infinite for one that cuts off."""
     return np.clip(x, -limit, limit) if np.isinf(sharp) else x / (1.0 + np.abs(x / limit) ** sharp) ** (1.0 / sharp)
+
+
+def _gains_of_nominal(bench: Bench, index: int, limits: Sequence[float]) -> list[float]:
+    """Log likelihood gained by each limit of a sensor with nominal parameters: those fitted to clipped data give too little motion."""
+    form = Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[0])
+    model, (limit,) = limited(bench.model, form, "x0_0")
+    problem, free = bench.problem(model), (*bench.nominal, limit)
+    shifts = np.zeros((len(limits), len(free)))
+    shifts[:, -1] = np.log(np.array(limits) / limits[0])
+    nu = problem.nu(free, shifts, bench.fit.by)
+    return [likelihood(n, np.isfinite(n), problem.floor)[1] - bench.fit.likelihood for n in nu]
 
 
 def limited(model: Model, form: Form, stem: str) -> tuple[Model, tuple[Free, ...]]:

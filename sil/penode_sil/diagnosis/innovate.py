@@ -89,7 +89,10 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
     counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it."""
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
     accepted, most = list(end.accepted), max((a.trial.gain for a in end.accepted), default=0.0)
-    large = [_is_required(a.trial, level, most) or is_large(a.trial, _worth(a.trial, level, a.trial.whole)) for a in accepted]
+    large = [
+        _is_required(a.trial, max(level, end.bench.level.size), most) or is_large(a.trial, _worth(a.trial, level, a.trial.whole))
+        for a in accepted
+    ]
     if all(large):
         return replace(end, large=tuple(large))
     problem = bench.problem()
@@ -111,7 +114,7 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
 def _is_required(t: Trial, level: float, most: float) -> bool:
     """Is it a force beside which next to nothing remains? Held-out blocks have accepted it; but where another form gained the `most`, a
     curve that is off by MIN_FORM from what is there leaves the square of that for others to make up for."""
-    share, gain = RATIO**2 * level, MIN_FORM**2 * most
+    share, gain = RATIO * level, MIN_FORM**2 * most
     return t.form.how == "force" and t.share >= share and t.gain >= gain
 
 

@@ -81,7 +81,6 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None], sti
     wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
     trials = [_fitted(bench, base, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen, strict=True)]
-    trials = [_from_part(bench, base, wide, moved, terms, t, trials) for t in trials]
     trials += [_fitted(bench, base, wide, moved, terms, t, np.ones(1)) for t in _holds(bench, trials, terms)]
     trials += _of_all(bench, base, trials, moved, terms)
     return sorted(trials, key=lambda t: -t.gain), wide
@@ -140,8 +139,7 @@ def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence
             hypotheses.append(np.stack([next(columns) for _ in f.parts], axis=-1))
         else:
             hypotheses.append(_slope(bench, f)[:, :, None])
-    signs = [[p.sign for p in f.parts] if f.how == "force" else [0] for f in forms]
-    return sorted(zip(scores(bench.fit, hypotheses, signs), forms, strict=True), key=lambda pair: -pair[0].gain)
+    return sorted(zip(scores(bench.fit, hypotheses), forms, strict=True), key=lambda pair: -pair[0].gain)
 
 
 def _bent(bench: Bench, index: int, terms: Sequence[Term]) -> list[tuple[Score, Form]]:
@@ -206,25 +204,15 @@ def _slope(bench: Bench, form: Form) -> Array:
     return (nu[1] - nu[0]) / (0.1 * f.unit)
 
 
-def _fitted(
-    bench: Bench,
-    base: Fit,
-    wide: Model,
-    moved: Sequence[Motion],
-    terms: Sequence[Term],
-    term: Term,
-    sizes: Array,
-    start: Sequence[Free] = (),
-) -> Trial:
-    """Fits a term beside those accepted, from a `start`, or the best fit so far with the sizes that its score promises; its gain is that
-    over `base`.
+def _fitted(bench: Bench, base: Fit, wide: Model, moved: Sequence[Motion], terms: Sequence[Term], term: Term, sizes: Array) -> Trial:
+    """Fits a term beside those accepted, from the best fit so far with the sizes that its score promises; its gain is that over `base`.
     Where parameters are hardly known, and for a limit, which may have bent them, it also starts from the nominal values, and from a free
     run of these: the motion of a wrong plant promises little."""
     problem = bench.problem(wide)
     n_x = len(wide.states)
     by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))
-    starts, runs = [start or (*bench.fit.free, *_sized(term, sizes))], []
-    if not start and (term.form.how == "clip" or any(f.log for f in bench.nominal)):
+    starts, runs = [(*bench.fit.free, *_sized(term, sizes))], []
+    if term.form.how == "clip" or any(f.log for f in bench.nominal):
         most = [SMALL * f.sigma for f in term.free if not f.log]
         little = np.clip(sizes[: len(most)], *np.outer((-1.0, 1.0), most))
         own = {f.target for f in bench.nominal}
@@ -239,23 +227,6 @@ def _fitted(
     whole = base.taken_whole(best, problem.floor)
     gain, free = best.criterion() - base.criterion(), max((r.likelihood for r in runs), default=-np.inf)
     return Trial(term.form, term, best, gain, level, share(bench, [*same, term], best, moved), most, whole, free)
-
-
-def _from_part(
-    bench: Bench, base: Fit, wide: Model, moved: Sequence[Motion], terms: Sequence[Term], t: Trial, trials: Sequence[Trial]
-) -> Trial:
-    """A trial, fitted again from the best that has a part of its laws, where that gains more: a fit of more values ended elsewhere."""
-    part = max((p for p in trials if is_part(p.form, t.form)), key=lambda p: p.gain, default=t)
-    if part.gain <= t.gain:
-        return t
-    laws = {p.law: name for name, p in zip(part.term.elements, part.form.parts, strict=True)}
-    of_part = {f.target: f.value for f in part.fit.free}
-    own = [f for f in part.fit.free if f.target not in {x.target for x in part.term.free}]
-    for name, p in zip(t.term.elements, t.form.parts, strict=True):
-        known, values = laws.get(p.law, name), [f for f in t.term.free if f.target.startswith(f"{name}_")]
-        own += [replace(f, value=of_part.get(f.target.replace(name, known), f.value)) for f in values]
-    again = _fitted(bench, base, wide, moved, terms, t.term, np.zeros(0), own)
-    return max(t, again, key=lambda x: x.gain)
 
 
 def _sized(term: Term, sizes: Array) -> list[Free]:

@@ -205,8 +205,9 @@ def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Tri
     same = [t for t in trials if of_curve(t) == of_curve(best)]
     found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
     for t in more:
-        better, little = t.blocks - found.blocks, wrong(t.level.size)
-        share = little if name_of(t) == name_of(found) else max(little, MIN_FORM) if is_part(found.form, t.form) else 1.0
+        better, same_name = t.blocks - found.blocks, name_of(t) == name_of(found)
+        nested = same_name or is_part(found.form, t.form)
+        share = max(wrong(t.level.size), 0.0 if same_name else MIN_FORM) if nested else 1.0
         if np.all(better > 0.0) and np.sum(better) > margin(found, base, share):
             found = t
     return found

@@ -17,7 +17,6 @@ from .catalogue.actuators import ACTUATORS
 from .catalogue.form import Motion
 from .evidence.bench import UPDATES, Bench
 from .evidence.fit import Fit
-from .evidence.samples import KNOWN
 from .terms import Term, drive, moves
 
 Array = NDArray[np.float64]
@@ -27,6 +26,7 @@ RIGHT = 0.93
 BENT = 0.6  # of a friction or a cube along a Gaussian motion is beside a straight line, in rms: sqrt(1 - 2/pi), sqrt(1 - 9/15)
 Z_95 = 1.96  # standard deviations that hold 95 %
 RATIO = 3.0  # times the unmodelled force that remains beside all causes: where that is little, a name is worth it from less on
+KNOWN = 1.2  # times the noise that is known, about what it may be: it is another one at another time
 SYSTEMATIC = 0.007  # of the force there: what mis-modelling of 3.5 % does to a form's size, like it to 0.2 in rms, one direction of 25
 LINEAR = {"linear_spring": "s", "linear_damper": "v"}  # laws that a refit of their parameter makes as large as they have to be
 ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so

@@ -32,6 +32,9 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     for ratio in RATIOS:
         omega = ratio * motion.v_rms / motion.s_rms
+        turn = omega * motion.parts[0].step / 0.21  # of a sample: a fit may make it 7 times as fast, and steps have to follow
+        if turn > 1.0:
+            break
         part = Part("tuned_mass", ("mass", "kg"), {"omega": (omega, "1/s"), "loss": (LOSS, "1")}, 1, span=SPAN)
         yield Form(KINDS[0], bodies[0] if bodies else place.name, "force", index, (part,))
 

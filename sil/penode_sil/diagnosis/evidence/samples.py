@@ -14,7 +14,6 @@ Array = NDArray[np.float64]
 SEGMENT = 64  # samples of which a spectrum is taken
 LOBE = 4  # half width in bins of the window's main lobe (Harris, Proc. IEEE 66, 1978, table I: 92 dB down); so many bins count together
 WINDOW = signal.windows.blackmanharris(SEGMENT)
-KNOWN = 1.2  # times what a file states of it, about what a noise may be: it is another one at another time
 QUIETEST = slice(LOBE, 7 * SEGMENT // 16)  # bins to look at: what is resampled shows little of its noise above 0.4 of the rate
 
 
@@ -43,10 +42,7 @@ def _spectra(x: Array) -> list[Array]:
 
 
 def noise(series: Sequence[Sequence[Array]], stated: Array) -> Array:
-    """Noise of a sample [n_z], in the sensors' SI units: what the file states, but not more than second differences show, and up to KNOWN
-    times that where the spectrum shows more; of a sensor for which it states nothing (0), what the spectrum shows."""
-    own = [
-        max(min(bent(s) or most, most), min(shown(s), KNOWN * most)) if most > 0.0 else shown(s)
-        for s, most in zip(series, stated, strict=True)
-    ]
+    """Noise of a sample [n_z], in the sensors' SI units: what the file states, but not more than second differences show; of a sensor for
+    which it states nothing (0), what the spectrum shows."""
+    own = [min(bent(s) or most, most) if most > 0.0 else shown(s) for s, most in zip(series, stated, strict=True)]
     return np.maximum(own, 1e-12)

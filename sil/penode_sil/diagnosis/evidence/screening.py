@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from .bench import Bench
 from .fit import Fit
@@ -96,20 +95,16 @@ class Beside:
         return 0.5 * int(np.sum(self.fit.used)) * float(np.log(float(self.rest @ self.rest) / max(left, 1e-300)))
 
 
-def scores(fit: Fit, hypotheses: Sequence[Array], signs: Sequence[Sequence[int]]) -> list[Score]:
-    """Scores of hypotheses [updates, n_z, sizes] each, linearised about a fit (Rao 1948), with sizes of these `signs` (0: either)."""
+def scores(fit: Fit, hypotheses: Sequence[Array]) -> list[Score]:
+    """Scores of hypotheses [updates, n_z, sizes] each, linearised about a fit (Rao 1948)."""
     beside, found = Beside.of(fit), []
-    for h, ways in zip(hypotheses, signs, strict=True):
+    for h in hypotheses:
         whole, columns = beside.columns(h)
         before = np.sum(whole**2, axis=0)
         if np.any(np.sum(columns**2, axis=0) < NEARLY * before) or not before.all():
             found.append(Score(0.0, np.zeros(h.shape[2])))
             continue
         theta = np.linalg.lstsq(columns, -beside.rest, rcond=1e-9)[0]
-        if np.any(theta * ways < 0.0):
-            bounds = np.array([(-np.inf if way <= 0 else 0.0, np.inf if way >= 0 else 0.0) for way in ways]).T
-            q, r = np.linalg.qr(columns)
-            theta = lsq_linear(r, -q.T @ beside.rest, bounds).x
         found.append(Score(beside.gain(float(np.sum((beside.rest + columns @ theta) ** 2))), theta))
     return found
 
