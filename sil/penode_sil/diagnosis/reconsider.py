@@ -113,7 +113,7 @@ def _has_other(a: Accepted) -> bool:
     """Was a form preferred to one of another name, of the same curve, with fewer values; or is it of a curve of which a place has one, so
     that no other form of that was tried beside what came later?"""
     others = [t for t in a.trials if of_curve(t) == of_curve(a.trial) and name_of(t) != name_of(a.trial)]
-    return any(len(t.term.free) < len(a.trial.term.free) for t in others) or catalogue.is_one(a.trial.form.kind)
+    return any(len(t.term.free) < len(a.trial.term.free) for t in others) or catalogue.has_one_curve(a.trial.form.kind)
 
 
 def _score(t: Trial) -> float:

@@ -58,11 +58,11 @@ def stem(kind: str) -> str:
     return getattr(OF.get(kind), "STEMS", {}).get(kind, kind)
 
 
-def is_one(kind: str) -> bool:
+def has_one_curve(kind: str) -> bool:
     """Are a kind and the others of its file forms of one curve, of which a place has one?"""
     return getattr(OF.get(kind), "ONE", False)
 
 
 def curve(kind: str) -> object:
     """What only one of is at a place: the file of a kind where its kinds are forms of one curve, else the kind itself."""
-    return OF[kind] if is_one(kind) else kind
+    return OF[kind] if has_one_curve(kind) else kind
