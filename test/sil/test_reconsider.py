@@ -5,17 +5,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from penode_sil.diagnosis import rounds
 from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence.gain import Level
 from penode_sil.diagnosis.fit import Free
 from penode_sil.diagnosis.innovate import _own_names
 from penode_sil.diagnosis.reconsider import reconsidered
-from penode_sil.diagnosis.rounds import MIN_FORM, Accepted, Grown, simplest
+from penode_sil.diagnosis.rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, _is_sure, simplest
 from penode_sil.diagnosis.terms import Term, Trial
 from penode_sil.diagnosis.worth import WORTH
 
@@ -169,6 +171,59 @@ def test_rivals_of_a_form_that_stays_are_those_beside_all_others():
     good = (trial("stribeck", 1300.0), trial("degressive", 1250.0))
     end = reconsidered(Rounds(scores, {("bump_stop",): good}), grown([first, second], scores))
     assert kinds(end.accepted) == ("stribeck_friction", "bump_stop") and end.accepted[0].trials == good
+
+
+@pytest.mark.parametrize("share, kept", [(0.9, True), (1.1, False)])
+def test_what_makes_up_for_a_curve_is_no_reason_for_a_simpler_one(share, kept):
+    """A bump stop that gains less than MIN_FORM of what a peak of friction does at its place. Beside it, and only there, friction without a
+    peak predicts better."""
+    first = accepted(0, replace(trial("stribeck", 600.0, whole=0.9), gain=600.0), [trial("friction", 450.0)])
+    second = accepted(1, replace(trial("stop", 700.0), gain=share * MIN_FORM * 600.0))
+    scores = {("stribeck_friction", "bump_stop"): 700.0, ("bump_stop",): 0.0, (): 0.0, ("coulomb_friction", "bump_stop"): 750.0}
+    scores |= {("coulomb_friction",): 450.0}
+    good = {(): [trial("stribeck", 600.0), trial("friction", 450.0)], ("bump_stop",): [trial("friction", 750.0), trial("stribeck", 700.0)]}
+    end = reconsidered(Rounds(scores, good), grown([first, second], scores))
+    assert kinds(end.accepted)[0] == ("stribeck_friction" if kept else "coulomb_friction")
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Stub of a bench: its level and fit, and nothing to fit them with."""
+
+    level: Level
+    fit: object
+
+    def problem(self) -> None:
+        return None
+
+
+def test_a_form_is_judged_at_the_likeliest_level_without_it(monkeypatch):
+    """The form before has let it fall: blocks look for larger levels from there."""
+    less, asked = Level(0.01, 1.0), []
+    monkeypatch.setattr(rounds, "fit_level", lambda bench, problem, fit, level: (less, SimpleNamespace(free=())))
+
+    def wider(bench, problem, fit, level, sizes):
+        asked.append((level, sizes))
+        return level, fit, np.ones(4)
+
+    found, scores = rounds._based(Bench(Level(0.3, 1.0), None), SimpleNamespace(fit_level=wider))
+    assert (found.level, asked) == (less, [(less, rounds.levels(less))]) and scores.tolist() == [1.0] * 4
+
+
+@pytest.mark.parametrize(
+    "level, least, most, sure",
+    [
+        (0.2 * WORTH, 1.1 * MIN_GAIN, 0.0, True),
+        (0.2 * WORTH, 0.9 * MIN_GAIN, 0.0, False),
+        (0.2 * WORTH, 1.1 * MIN_GAIN, 1000.0, False),
+        (0.5 * WORTH, 1.1 * MIN_GAIN, 0.0, False),
+    ],
+)
+def test_a_small_form_that_every_block_demands_is_no_end(level, least, most, sure):
+    """Where little is unmodelled, unless one that gained the `most` may leave that much by its curve."""
+    best = replace(trial("cubic", 0.0), gain=100.0, blocks=np.array([least, 50.0, 50.0, 50.0]))
+    found = [accepted(0, replace(trial("stop", 0.0), gain=most))]
+    assert _is_sure(SimpleNamespace(level=Level(level, 1.0)), best, np.zeros(4), found) is sure
 
 
 def test_a_constant_beside_a_friction_is_left_for_a_law_that_pulls_to_one_side():

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .evidence.bench import Bench
-from .evidence.blocks import Blocks
+from .evidence.blocks import BLOCKS, Blocks
 from .evidence.fit import Fit
 from .evidence.observer import Filter, bias
 from .propose import FREE_RUN
 from .reconsider import centred, reconsidered
-from .rounds import LEVEL_FACTORS, MIN_FORM, Accepted, Grown, Rounds, is_large, name_of, terms_of
+from .rounds import LEVEL_FACTORS, MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, is_large, name_of, terms_of
 from .terms import Term, Trial
 from .worth import RATIO, Z_95, least, mostly, remaining
 
@@ -90,7 +90,7 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
     accepted, most = list(end.accepted), max((a.trial.gain for a in end.accepted), default=0.0)
     large = [
-        _is_required(a.trial, max(level, end.bench.level.size), most) or is_large(a.trial, _worth(a.trial, level, a.trial.whole))
+        _is_required(a.trial, level, end.bench.level.size, most) or is_large(a.trial, _worth(a.trial, level, a.trial.whole))
         for a in accepted
     ]
     if all(large):
@@ -111,16 +111,23 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
     return replace(end, accepted=tuple(accepted), large=tuple(large))
 
 
-def _is_required(t: Trial, level: float, most: float) -> bool:
-    """Is it a force beside which next to nothing remains? Held-out blocks have accepted it; but where another form gained the `most`, a
-    curve that is off by MIN_FORM from what is there leaves the square of that for others to make up for."""
-    share, gain = RATIO * level, MIN_FORM**2 * most
-    return t.form.how == "force" and t.share >= share and t.gain >= gain
+def _is_required(t: Trial, level: float, followed: float, most: float) -> bool:
+    """Is it one beside which next to nothing remains, by the `level` of a free run and, but where every block demands it on average by
+    MIN_GAIN, by that which the observer has `followed`? Held-out blocks have accepted it; but where another form gained the `most`, a curve
+    that is off by MIN_FORM from what is there leaves the square of that for others to make up for."""
+    remains = level if t.gain > BLOCKS * MIN_GAIN else max(level, followed)
+    share, gain = max(RATIO * remains, _finest(t)), MIN_FORM**2 * most
+    return t.share >= share and t.gain >= gain
 
 
 def _worth(t: Trial, level: float, taken: float) -> float:
-    """The share from which on a form has a name, see `least`: of an input or a sensor no less than FINEST."""
-    return max(least(level, taken), FINEST * (t.form.how != "force"))
+    """The share from which on a form has a name, see `least`."""
+    return max(least(level, taken), _finest(t))
+
+
+def _finest(t: Trial) -> float:
+    """The least share of a form of an input or a sensor."""
+    return FINEST * (t.form.how != "force")
 
 
 def _found(rounds: Rounds, end: Grown, worth_naming: Sequence[bool], run: Fit, level: float) -> Found:

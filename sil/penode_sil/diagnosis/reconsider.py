@@ -83,7 +83,7 @@ def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
     last = found[-1:] if found and grown.large[-1] else []
     while doubted:
         a = doubted.pop(0)
-        others = [x for x in found if x is not a]
+        others = [x for x in found if x is not a and not _makes_up(x.trial, a.trial)]
         bench, scores, within = rounds.beside(others)
         if whole - float(np.sum(scores)) <= MIN_GAIN:
             rounds.log(f"{name_of(a.trial)} is not needed")
@@ -107,6 +107,11 @@ def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
         return replace(grown, accepted=tuple(found))
     end = rounds.grow(found)
     return end if _total(end) >= _total(grown) - loss else grown
+
+
+def _makes_up(t: Trial, other: Trial) -> bool:
+    """Does a form gain less than MIN_FORM of what another does at its place: is the curve of that not quite what is there?"""
+    return t.form.at == other.form.at and t.gain < MIN_FORM * other.gain
 
 
 def _has_other(a: Accepted) -> bool:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from . import clipping, holding, late
 from .adopting import adopt
 from .catalogue import curve
-from .evidence.bench import SIZES, Bench
+from .evidence.bench import SIZES, Bench, fit_level
 from .evidence.blocks import BLOCKS, Blocks
 from .evidence.fit import Problem
 from .evidence.gain import Level
@@ -70,9 +70,9 @@ class Rounds:
 
     def grow(self, accepted: Sequence[Accepted] = ()) -> Grown:
         """Accepts causes beside those accepted already, one at a time, the best predictor first, until none predicts enough better, or the
-        best is too small for a name and cannot hide a larger one. The search goes on after a small form that takes most of the misfit, or,
-        while none is large, enough that little may remain: one more cause may explain the rest. If it does, all forms are judged again by
-        the smaller level that remains."""
+        best is too small for a name and cannot hide a larger one. The search goes on after a small form that takes most of the misfit, or
+        that every block demands (`_is_sure`), or, while none is large, enough that little may remain: one more cause may explain the rest.
+        If it does, all forms are judged again by the smaller level that remains."""
         bench, scores, found = self.beside(accepted)
         good = self.good(bench, scores, found)
         if not good and not found and bench.level.size >= WORTH:
@@ -82,7 +82,8 @@ class Rounds:
         hides = not found or large[-1] or any(_hidden(t, found[-1].trial) for t in found[-1].trials)
         while good:
             best = simplest(good, scores, terms_of(found))
-            if not hides and not _matters(best) and not _may_remain(bench, large, best):
+            sure = _is_sure(bench, best, scores, found)
+            if not hides and not sure and not _matters(best) and not _may_remain(bench, large, best):
                 break
             number = 1 + max((a.number for a in found), default=-1)
             bench, terms = adopt(bench, best, number)
@@ -90,7 +91,7 @@ class Rounds:
             found.append(Accepted(best, number, tuple(terms), good))
             large.append(is_large(best, least(bench.level.size, best.whole)))
             hides = large[-1] or any(_hidden(t, best) for t in good)
-            if not hides and not mostly(best.whole) and not _may_remain(bench, large, best):
+            if not hides and not sure and not mostly(best.whole) and not _may_remain(bench, large, best):
                 good = ()
                 break
             good = self.good(bench, scores, found)
@@ -166,6 +167,12 @@ def _may_remain(bench: Bench, large: Sequence[bool], best: Trial) -> bool:
     return not any(large) and best.taken >= MIN_TAKEN and least(bench.level.size, 0.0) < WORTH
 
 
+def _is_sure(bench: Bench, best: Trial, scores: Array, found: Sequence[Accepted]) -> bool:
+    """Does every block demand a form by MIN_GAIN, where little is unmodelled, and more of it than the curve of another one may be off?"""
+    demanded = bool(np.all(best.blocks - scores > MIN_GAIN)) and least(bench.level.size, 0.0) < WORTH
+    return demanded and all(best.gain >= MIN_FORM * a.trial.gain for a in found)
+
+
 def _matters(t: Trial) -> bool:
     """Is a form large, or, as small as it is, nearly all that is missed?"""
     return is_large(t, WORTH) or alone(t.whole)
@@ -182,8 +189,11 @@ def levels(level: Level) -> list[float]:
 
 
 def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:
-    """The bench with the level that predicts best, and its scores [blocks], less what parameters cost that are not what the file states."""
-    level, fit, scores = blocks.fit_level(bench, bench.problem(), bench.fit, bench.level, levels(bench.level))
+    """The bench with the level that predicts best, and its scores [blocks], less what parameters cost that are not what the file states.
+    The likeliest comes first: a form that is new there lets it fall, which would count for the next form otherwise."""
+    problem = bench.problem()
+    level, fit = fit_level(bench, problem, bench.fit, bench.level)
+    level, fit, scores = blocks.fit_level(bench, problem, fit, level, levels(level))
     return replace(bench, level=level, fit=fit), scores - stated(fit.free) / len(scores)
 
 
@@ -236,7 +246,7 @@ def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
     """Is a form enough better, with a size that is not zero, nor a delay too short to be one, nor a limit that samples are beyond?"""
     if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN):
         return False
-    if t.form.how == "late" and t.fit.value(t.term.free[0].target) < late.SHORT * bench.step:
+    if t.form.how in late.HOW and t.fit.value(t.term.free[0].target) < late.SHORT * bench.step:
         return False
     if t.form.how == "clip" and not clipping.is_possible(bench, t.form, t.fit.value(t.term.free[0].target)):
         return False
