@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from penode_sil.diagnosis.evidence.colour import Colour, is_white
-from penode_sil.diagnosis.evidence.observer import earlier
+from penode_sil.diagnosis.evidence.latency import amplified, earlier, without_lag
 
 UPDATE, COUNT, FREQUENCIES, BEFORE = 4, 200_000, 2048, 8
 POLE, SLOW = 0.95, 0.8  # of the noise of a sensor with unit power: this share of it is slow
@@ -101,6 +101,25 @@ def test_what_was_not_measured_stays_so() -> None:
     y = np.ones(50)
     y[20] = np.nan
     assert np.flatnonzero(np.isnan(earlier(y, np.array([0.5]))[0])).tolist() == [19, 20, 49]
+
+
+@pytest.mark.parametrize("lag", (0.5, 4.0))
+def test_a_signal_before_it_lagged(lag: float) -> None:
+    """A tone behind a lag, which divides it by 1 + j w lag; its ends ring as in `test_a_tone_between_samples`, times the lag."""
+    t, w = np.arange(300.0), 0.4
+    behind = np.imag(np.exp(1j * w * t) / (1.0 + 1j * w * lag))
+    same, before = (x[40:260] for x in without_lag(behind, np.array([0.0, lag])))
+    assert same == pytest.approx(behind[40:260], abs=1e-9) and before == pytest.approx(np.sin(w * t)[40:260], abs=0.2 * lag / 40.0**2)
+    behind[150] = np.nan
+    assert np.flatnonzero(np.isnan(without_lag(behind, np.array([lag]))[0])).tolist() == [150]
+
+
+def test_what_a_signal_without_its_lag_has_more() -> None:
+    """A motion at all frequencies: the mean logarithm of |1 + j w lag| up to that of means of four, by quadrature."""
+    steps = np.cumsum(np.random.default_rng(4).normal(size=4096)) + np.linspace(0.0, 1.0, 4096) ** 2
+    turns = np.linspace(0.0, np.pi / 4.0, 100_001)
+    expected = np.exp(np.mean(np.log(np.hypot(1.0, 3.0 * turns))))
+    assert amplified(steps, np.array([0.0, 3.0]), 4) == pytest.approx([1.0, expected], rel=0.01)
 
 
 def test_only_motion_is_shifted() -> None:

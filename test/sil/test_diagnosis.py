@@ -563,6 +563,7 @@ FAULTS = {  # sensor, what it shows, and its kind
         lambda y: CubicSpline(SHARE, y)(np.maximum(SHARE - 0.08 * LATE / (STEP * (SAMPLES - 1)), 0.0)),
         "sensor_delay",
     ),
+    "behind a lag": ("a_body", lambda y: lsim(([1.0], [LATE / 2.0, 1.0]), y, STEP * np.arange(SAMPLES))[1], "sensor_delay"),
     "behind a filter": (
         "a_body",
         lambda y: lsim(([1.0], [LATE**2 / 36.0, LATE / 3.0, 1.0]), y, STEP * np.arange(SAMPLES))[1],
@@ -589,7 +590,13 @@ def test_a_delay_is_written_as_it_was_fitted():
     assert late.substeps(delay, 1e-3) == 1 and late.substeps(delay, 10.0 * delay) == 35  # poles of 12^(1/2) at steps of 1
 
 
-@pytest.mark.parametrize("fault", sample(FAULTS, "late", "drifting gain", "near its limits"))
+def test_a_lag_is_written_as_it_was_fitted():
+    found = late.lagging("u", ("t", "late"), "m", 0.02)
+    assert (found.expression, found.equations) == ("late", ('late = "der(late)*t = u - late"',))
+    assert found.parameter == 't = { value = 0.02, unit = "s" }' and found.states == ('late = { unit = "m" }',)
+
+
+@pytest.mark.parametrize("fault", sample(FAULTS, "late", "behind a lag", "drifting gain", "near its limits"))
 def test_the_file_has_the_fault_of_a_sensor(tmp_path, fault, show):
     """Named; the C of the extended file shows it as well: what is left of a new recording is its noise. The height of the body is
     measured too, so no load looks like a bias."""

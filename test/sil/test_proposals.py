@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""Forms before they are accepted: which limits of a sensor its samples allow."""
+"""Forms before they are accepted: which limits of a sensor its samples allow, and which forms are fitted."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import clipping
+from penode_sil.diagnosis import clipping, propose
 from penode_sil.diagnosis.catalogue.form import Form
+from penode_sil.diagnosis.evidence.screening import Score
 
 
 @pytest.mark.parametrize("limit, possible", [(1.0, True), (0.97, True), (0.9, False)])
@@ -20,3 +21,11 @@ def test_no_limit_that_samples_are_beyond(limit, possible):
     y[::1000] = 40.0
     bench = SimpleNamespace(records=(SimpleNamespace(y=y[:, None]),), noise=np.array([0.01]))
     assert clipping.is_possible(bench, Form("sensor_clipping", "y", "clip", 0), limit) is possible
+
+
+def test_forms_of_one_fault_take_one_place():
+    """Late and lagging sensors promise the same; with a place for each they would crowd out the delay of the input behind them."""
+    sensors = [Form("sensor_delay", f"y{j}", how, j, note=how) for j in range(propose.TRIED - 1) for how in ("late", "lag")]
+    forms = [*sensors, Form("input_delay", "u", "input_delay", 0), Form("input_gain", "u", "input_gain", 0)]
+    chosen = propose._chosen([(Score(100.0 - i, np.ones(1)), f) for i, f in enumerate(forms)])
+    assert [f for _, f in chosen] == forms[:-1]

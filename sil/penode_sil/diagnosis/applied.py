@@ -52,10 +52,10 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     grown = extend(model, [e for e, _ in own], {}, [place for _, place in own])
     limits = {t.form.index: [values[f.target] for f in t.free] for t in terms if t.form.how == "clip"}
     texts = [driven.through(named(s.expression)) for s in grown.sensors]
-    delays = {t.form.index: fit.value(t.free[0].target) for t in terms if t.form.how == "late"}
+    delays = {t.form.index: (t.form.how, fit.value(t.free[0].target)) for t in terms if t.form.how in late.HOW}
     room = model.filter is None  # whose states a file lists, with how sure each is at the start
-    driven.left += [] if room else [_uncorrected(t) for t in terms if t.form.how == "late"]
-    delays = {j: d for j, d in delays.items() if room and d > late.SHORT * model.sample_time}
+    driven.left += [] if room else [_uncorrected(t) for t in terms if t.form.how in late.HOW]
+    delays = {j: (how, d) for j, (how, d) in delays.items() if room and d > late.SHORT * model.sample_time}
     sensors = [_sensor(model, j, text, values, offsets, limits, delays, driven) for j, text in enumerate(texts)]
     units_of = {o.name: o.unit for o in model.outputs}  # one name means one quantity
     outputs = [
@@ -64,7 +64,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
         if x and s.name in units_of
     ]
     outputs += [x for x in moved["outputs"] if x.split(" = ")[0] not in {o.split(" = ")[0] for o in outputs}]
-    substeps = max((late.substeps(d, model.sample_time) for d in delays.values()), default=1)
+    substeps = max((late.substeps(d, model.sample_time) for _, d in delays.values()), default=1)
     lines = _head(model, terms, substeps)
     for title, entries in (
         ("parameters", [*parameters, *driven.parameters]),
@@ -149,7 +149,7 @@ def _sensor(
     values: dict[str, float],
     offsets: Collection[str],
     limits: Mapping[int, Sequence[float]],
-    delays: Mapping[int, float],
+    delays: Mapping[int, tuple[str, float]],
     driven: Driven,
 ) -> dict[str, object]:
     """What a sensor that measures otherwise has as its value and unit; nothing for one that does not."""
@@ -161,7 +161,9 @@ def _sensor(
         return name
 
     if j in delays:
-        found = late.written(expression, [driven.name(f"{what}_{s.name}") for what in ("delay", "late", "late_rate")], unit, delays[j])
+        how, delay = delays[j]
+        stems, written = late.HOW[how]
+        found = written(expression, [driven.name(f"{stem}_{s.name}") for stem in stems], unit, delay)
         driven.parameters.append(found.parameter)
         driven.states += found.states
         driven.equations += found.equations

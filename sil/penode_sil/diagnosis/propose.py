@@ -107,7 +107,8 @@ def _chosen(ranked: Sequence[tuple[Score, Form]]) -> list[tuple[Score, Form]]:
     chosen: list[tuple[Score, Form]] = []
     for pair in plainest:
         alike = [f for _, f in chosen if (catalogue.curve(f.kind), f.at) == (catalogue.curve(pair[1].kind), pair[1].at)]
-        if len(chosen) < TRIED and len(alike) < TRIED // 2:
+        faults = {(f.kind, f.at) for _, f in chosen if f.how != "force"}  # of inputs and sensors: their forms do about the same
+        if sum(f.how == "force" for _, f in chosen) + len(faults) < TRIED and len(alike) < TRIED // 2:
             chosen.append(pair)
     for score, form in [pair for pair in plainest if pair not in chosen]:
         own = [f for _, f in chosen if f.at == form.at and (f.limit or not form.limit)]
@@ -126,7 +127,8 @@ def _taken(form: Form, terms: Sequence[Term]) -> bool:
     """Has the model that form already, or one of a curve of which a place has only one?"""
     there = [t.form for t in terms if t.form.at == form.at]
     one = catalogue.curve(form.kind)
-    return any((f.kind, f.note) == (form.kind, form.note) or (one != form.kind and catalogue.curve(f.kind) == one) for f in there)
+    same = [f.kind for f in there if f.how != "force" or f.note == form.note]  # of an input or a sensor, a kind is there once
+    return form.kind in same or (one != form.kind and any(catalogue.curve(f.kind) == one for f in there))
 
 
 def _screened(bench: Bench, probe: Probe, forms: Sequence[Form], moved: Sequence[Motion]) -> list[tuple[Score, Form]]:

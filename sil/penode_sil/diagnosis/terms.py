@@ -84,7 +84,7 @@ def free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
             return (Free((form.how, form.index, form.series), 0.0, 0.1, sigma=1.0, low=0.0, high=1.2),)
         case "scale":
             return (Free(scale(form.where), 1.0, 0.01, sigma=0.3, origin=1.0),)
-        case "late":
+        case "late" | "lag":
             return (Free((form.how, form.index), 0.0, 0.1 * step, sigma=step, low=0.0),)
     v = ACTUATORS[form.how].fitted(drive(bench, form.index))
     return (Free((form.how, form.index), form.limit or v.start, v.unit, sigma=v.sigma, low=v.low, high=v.high),)

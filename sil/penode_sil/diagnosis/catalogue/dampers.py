@@ -11,7 +11,7 @@ import numpy as np
 from penode_gen.model import GROUND, Model
 
 from ..plant import Place
-from . import friction
+from . import friction, powers
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("asymmetric_damper", "degressive_damper", "quadratic_damper", "damper_fading")
@@ -32,7 +32,7 @@ PARAMETERS = {  # what each number of a report means
         "low_rate_damping": "slope of the whole damper below the knee",
         "high_rate_damping": "slope of the whole damper above the knee",
     },
-    "quadratic_damper": {"coefficient": "extra force coefficient v abs(v)"},
+    "quadratic_damper": {"coefficient": "extra force coefficient v abs(v)", "force_at_reach": "extra force at the greatest rate"},
     "damper_fading": {"loss": "share of the damping that is lost at the end of the first training recording"},
 }
 RIVALS = {
@@ -66,6 +66,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1, span=share / friction.WIDEST)
         yield Form(KINDS[1], place.loss, "force", index, (bent,))
     yield Form(KINDS[2], place.loss, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2")),))
+    yield Form(KINDS[2], place.loss, "force", index, (powers.odd("v", (motion.v_reach, "m/s"), 2.5),), powers.NOTE)
     for part in _fading(motion):
         yield Form(KINDS[3], place.loss, "force", index, (part,))
 
@@ -85,6 +86,8 @@ def _fading(motion: Motion) -> Iterable[Part]:
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     """See Kind."""
     own = v.nominal("linear_damper", "damping")
+    if form.note == powers.NOTE:
+        return {"force_at_reach": ("N", v(0, "force"))}
     match form.kind:
         case "asymmetric_damper" if form.note:
             return {"quadratic": ("N*s^2/m^2", v(0, "quadratic"))}

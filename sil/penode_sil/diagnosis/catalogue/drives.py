@@ -30,7 +30,7 @@ MEANING = {
     "input_saturation": "The actuator gives no more than a limit, whatever the recorded input asks for.",
     "input_slew_limit": "The actuator follows the recorded input at a limited rate.",
     "sensor_scale": "The sensor reads too much, or too little, by a factor.",
-    "sensor_delay": "The sensor reads with a delay.",
+    "sensor_delay": "The sensor reads with a delay, or with a lag.",
 }
 RIVALS = {
     ("sensor_scale", "wrong_parameter"): "record acceleration and deflection of other parts too, or weigh a body",
@@ -61,7 +61,7 @@ PARAMETERS = {
     "input_saturation": {"limit": "largest magnitude of the acting input"},
     "input_slew_limit": {"rate": "largest rate of the acting input"},
     "sensor_scale": {"scale": "reading over true value"},
-    "sensor_delay": {"delay": "from the motion to the reading"},
+    "sensor_delay": {"delay": "from the motion to the reading; of a sensor that lags, its time constant"},
 }
 ALIKE = {"input_delay": "sensor_delay", "sensor_delay": "input_delay", "input_gain": "sensor_scale", "sensor_scale": "input_gain"}
 ALIKE |= {"input_lag": "sensor_delay", "input_sign": "sensor_sign", "sensor_sign": "input_sign"}
@@ -99,6 +99,7 @@ def sensors(model: Model, count: int) -> Iterable[Form]:
         yield Form("sensor_scale", s.name, "scale", j)
         if count > 1 or model.inputs:  # there is something to be late against
             yield Form("sensor_delay", s.name, "late", j)
+            yield Form("sensor_delay", s.name, "lag", j, note="as a lag")
 
 
 def plain(model: Model, sensor: str, time: Array, z: Array) -> dict[str, Array]:

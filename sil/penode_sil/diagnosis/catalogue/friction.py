@@ -2,6 +2,7 @@
 # Copyright (c) 2026 the penode authors
 """Dry friction: of Coulomb, with a constant force beside it or a peak at low rates, with memory of the travel, by position or by load."""
 
+import itertools
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -68,11 +69,16 @@ def coulomb(motion: Motion, edge: float) -> Part:
     return Part("coulomb_friction", ("force", "N"), {"transition": (edge * motion.v_rms, "m/s")}, 1, span=SPAN, edge="transition")
 
 
-def peak(motion: Motion, share: float) -> Part:
+FALLS = (  # of a peak over rate/width, 1 at its largest: as a Gaussian does, or as 1/rate^2
+    "2.3316439815971242*rise*exp(-(v/width)^2)*v/width",
+    "1.8898815748423097*rise*(v/width)/(1 + abs(v/width)^3)",
+)
+
+
+def peak(motion: Motion, share: float, falls: str = FALLS[0]) -> Part:
     """What a friction has more at the lowest rates, of 1 at its largest; `share` of the rms rate, where it has fallen. One that is narrower
     than the transition only makes up for that."""
-    text, shapes = "2.3316439815971242*rise*exp(-(v/width)^2)*v/width", {"width": (share * motion.v_rms, "m/s")}
-    return Part(text, ("rise", "N"), shapes, 1, span=share / EDGES[0])
+    return Part(falls, ("rise", "N"), {"width": (share * motion.v_rms, "m/s")}, 1, span=share / EDGES[0])
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
@@ -85,8 +91,8 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         yield Form(KINDS[0], place.loss, "force", index, (slides,))
         if grounded:
             yield Form(KINDS[0], place.loss, "force", index, (slides, replace(loads.constant(), kind=loads.KINDS[0])), "with a constant")
-        for share in PEAKS if place.role != "body" else ():
-            yield Form(KINDS[1], place.loss, "force", index, (slides, peak(motion, share)))
+        for share, falls in itertools.product(PEAKS, FALLS) if place.role != "body" else ():
+            yield Form(KINDS[1], place.loss, "force", index, (slides, peak(motion, share, falls)))
         if place.role != "body":
             for grows, kind, note in _growing(motion, edge):
                 yield Form(kind, place.loss, "force", index, (slides, grows), note)

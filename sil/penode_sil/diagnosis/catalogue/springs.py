@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from penode_gen.model import Model
 
 from ..plant import Place
+from . import powers
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("cubic_spring", "asymmetric_spring", "bump_stop")
@@ -16,7 +17,11 @@ MEANING = {
     "bump_stop": "A stop: beyond a gap an extra spring comes into contact.",
 }
 PARAMETERS = {  # what each number of a report means
-    "cubic_spring": {"cubic": "extra force cubic s^3", "bend": "extra force bend s abs(s)"},
+    "cubic_spring": {
+        "cubic": "extra force cubic s^3",
+        "bend": "extra force bend s abs(s)",
+        "force_at_reach": "extra force at the greatest deflection",
+    },
     "asymmetric_spring": {"difference": "stiffness in compression less that in rebound", "quadratic": "extra force quadratic s^2"},
     "bump_stop": {"gap": "travel to the contact, positive on either side", "stiffness": "in contact, in addition to the spring"},
 }
@@ -34,6 +39,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         return
     yield Form(KINDS[0], place.name, "force", index, (Part("cubic_spring", ("cubic", "N/m^3")),))
     yield Form(KINDS[0], place.name, "force", index, (Part("bend*s*abs(s)", ("bend", "N/m^2")),), "odd square")
+    yield Form(KINDS[0], place.name, "force", index, (powers.odd("s", (motion.s_reach, "m"), 3.0),), powers.NOTE)
     yield Form(KINDS[1], place.name, "force", index, (Part("asymmetric_spring", ("stiffness", "N/m")),))
     yield Form(KINDS[1], place.name, "force", index, (Part("quadratic*s^2", ("quadratic", "N/m^2")),), "bent")
     for share in GAPS:
@@ -51,6 +57,8 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     """See Kind."""
+    if form.note == powers.NOTE:
+        return {"force_at_reach": ("N", v(0, "force"))}
     if form.kind == KINDS[0]:
         return {"bend": ("N/m^2", v(0, "bend"))} if form.note else {"cubic": ("N/m^3", v(0, "cubic"))}
     if form.kind == KINDS[1]:

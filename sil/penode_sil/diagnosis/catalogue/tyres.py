@@ -23,7 +23,10 @@ PARAMETERS = {  # what each number of a report means
         "knee": "rate at which it is half of that",
         "relaxation_time": "of its rubber",
     },
-    "tyre_liftoff": {"preload": "load of the tyre at zero deflection, the most that it can lose"},
+    "tyre_liftoff": {
+        "preload": "load of the tyre at zero deflection, the most that it can lose",
+        "stretch": "where it has lost half of its stiffness, if that goes gradually",
+    },
     "tyre_nonlinear": {"quadratic": "extra load quadratic s^2 when pressed in by s"},
 }
 RIVALS = {
@@ -31,6 +34,7 @@ RIVALS = {
     ("tyre_nonlinear", "tyre_liftoff"): "a rough road that unloads the tyre for moments, and a smooth one that does not",
 }
 STRAIGHT = ("tyre_nonlinear",)
+ROUNDED = "-stiffness*(max(s - static, 0) + rounding*log(1 + exp(-abs(s - static)/rounding)))"
 SHARES = (0.3, 0.6)  # of the greatest stretch: where a tyre leaves the road
 
 
@@ -48,13 +52,17 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         yield Form(
             KINDS[1], place.name, "force", index, (Part("liftoff", ("stiffness", "N/m"), {"static": (share * top, "m")}, 1, span=2.0),)
         )
+        left = {"static": (share * top, "m"), "rounding": (0.1 * top, "m")}  # the contact patch gets smaller first
+        yield Form(KINDS[1], place.name, "force", index, (Part(ROUNDED, ("stiffness", "N/m"), left, 1, span=2.0),), "rounded")
     yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_spring", ("quadratic", "N/m^2")),))
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     """See Kind."""
+    if form.note == "rounded":
+        return {"stretch": ("m", v(0, "static"))}
     if form.kind == KINDS[1]:
-        return {"preload": ("N", v(0, "stiffness") * v(0, "static"))}
+        return {"preload": ("N", (v.nominal("linear_spring", "stiffness") or v(0, "stiffness")) * v(0, "static"))}
     match form.note:
         case "falling":
             return {"damping": ("N*s/m", v(0, "damping")), "knee": ("m/s", v(0, "knee"))}

@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter, Signal, State
 
@@ -21,7 +20,7 @@ from ..compiling import compiled, ordered
 from ..fit import Free
 from ..noise import Experiment
 from ..plant import Place, anonymous, extend, external, rotational_unit
-from . import samples
+from . import latency, samples
 
 Array = NDArray[np.float64]
 UNMODELLED = "unmodelled"  # stem of the unmodelled forces and of their states
@@ -208,6 +207,7 @@ class Predictor:
             )
             z = run.z
             nu, finite = self._beyond(e, y, z[:, :, : self.n_z])
+            nu = self._as_measured(e, nu, free, shifts)
             sane &= (run.first_bad < 0) & finite
             nus.append(nu)
             seen.append(z[:, :, self.n_z : self.n_z + watched])
@@ -265,6 +265,15 @@ class Predictor:
         means = np.where(counts > 0, np.sum(np.where(there, whole, 0.0), axis=1) / np.maximum(counts, 1), np.nan)
         return means.transpose(2, 0, 1), np.isfinite(z).all(axis=(1, 2))
 
+    def _as_measured(self, e: int, nu: Array, free: Sequence[Free], shifts: Array) -> Array:
+        """Innovations [runs, updates, n_z] in units in which densities are those of what was measured: without a lag, a sensor of
+        recording `e` has more power, noise too."""
+        for f, shift in zip(free, shifts.T, strict=True):
+            if f.target[0] == "lag":
+                y, step = self.records[e].y[:, f.target[1]], self.records[e].step
+                nu[:, :, f.target[1]] /= latency.amplified(y, f.at(shift) / step, self.update)[:, None]
+        return nu
+
     def _blocks(self, x: Array) -> Array:
         """The samples [n, ...] between updates [updates, update, ...]."""
         return x[: len(x) // self.update * self.update].reshape(-1, self.update, *x.shape[1:])
@@ -293,9 +302,9 @@ class Predictor:
             elif f.target[0] == "start":
                 if f.target[1] == e:
                     start[:, f.target[2]] = values
-            elif f.target[0] == "late":
+            elif f.target[0] in latency.BEFORE:
                 y = np.array(np.broadcast_to(y, (runs, *y.shape[-2:])))
-                y[:, :, f.target[1]] = earlier(record.y[:, f.target[1]], values / record.step)
+                y[:, :, f.target[1]] = latency.BEFORE[f.target[0]](record.y[:, f.target[1]], values / record.step)
             elif f.target[0] == "input_added":
                 u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
                 u[:, :, f.target[1]] += values[:, None] * f.target[2].signals[e]
@@ -307,41 +316,9 @@ class Predictor:
         return np.clip(np.nan_to_num(start), -MAX_INNOVATION, MAX_INNOVATION), parameters, self._finer(e, u), y
 
 
-def moved(x: Array, samples: Array) -> Array:
-    """A signal [n] later by so many samples [runs], below zero earlier, joined by straight lines: [runs, n]; its ends stay as they are."""
-    at = np.arange(len(x))
-    return np.array([np.interp(at - d, at, x) for d in samples])
-
-
 def _order(f: Free) -> int:
     """Place of a free value in the row in which those of one input act."""
     return ACTUATORS[f.target[0]].order if f.target[0] in ACTUATORS else 0
-
-
-def earlier(y: Array, samples: Array) -> Array:
-    """A signal [n] as it was so many samples [runs] before it was seen: [runs, n]; what was not seen is NaN. Between samples it is
-    band-limited: straight lines would halve the power of its noise there, which likelihood takes for a delay."""
-    seen = np.arange(len(y)) + samples[:, None] <= len(y) - 1
-    good = np.isfinite(y)
-    near = moved(good.astype(float), -samples) == 1.0  # both neighbours were measured
-    filled = np.interp(np.arange(len(y)), np.flatnonzero(good), y[good]) if good.any() else np.zeros(len(y))
-    each, at = np.unique(samples, return_inverse=True)  # of the runs of a fit, most share it
-    return np.where(seen & near, _limited(filled, each)[at], np.nan)
-
-
-def _limited(x: Array, shifts: Array) -> Array:
-    """A signal [n] earlier by so many samples, `shifts` [.], by the phases of its spectrum: about the line through its ends, and reflected
-    in them, so that neither value nor slope jumps there. Frequencies with less than twice the power of the quietest part of the spectrum
-    show noise and stay as they are: its derivative is no evidence of a delay, and would hide what is."""
-    slope, at = (x[-1] - x[0]) / max(len(x) - 1, 1), np.arange(len(x))
-    rest = x - x[0] - slope * at
-    spectrum = np.fft.rfft(np.concatenate([rest, -rest[-2:0:-1]]))
-    width = max(len(spectrum) // samples.SEGMENT, 1)
-    power = ndimage.uniform_filter1d(np.abs(spectrum) ** 2, width)
-    noise = 2.0 * np.min(power)  # means of noise scatter by less than that
-    moving = power > noise
-    turn = np.exp(2j * np.pi * moving * np.fft.rfftfreq(2 * len(x) - 2) * shifts[:, None])
-    return x[0] + slope * (at + shifts[:, None]) + np.fft.irfft(spectrum * turn, 2 * len(x) - 2)[:, : len(x)]
 
 
 def alike(u: Array, filled: Callable[[Array], Array]) -> Array:

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Laws of the catalogue's forms along a motion, against the textbook's formulas."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from penode_sil.diagnosis.catalogue import friction, powers
+from penode_sil.diagnosis.catalogue.form import Motion, Moved, Part
+from penode_sil.diagnosis.catalogue.loads import put_on
+from penode_sil.diagnosis.catalogue.tyres import ROUNDED
+
+T = np.linspace(0.0, 4.0, 4001)
+NEAR = 1e-6  # square of a thousandth
+SWING = Moved(np.sin(3.0 * T), 3.0 * np.cos(3.0 * T), T)
+
+
+@pytest.mark.parametrize("exponent", (1.5, 3.0, 4.2))
+def test_a_power_of_the_deflection(exponent):
+    """Rounded near 0: by at most NEAR^(exponent/2) within a thousandth of the reach, and beyond that by NEAR (exponent - 1)/2."""
+    found = powers.odd("s", (2.0, "m"), exponent).along(SWING)
+    x = SWING.s / 2.0
+    assert found == pytest.approx(np.sign(x) * np.abs(x) ** exponent, abs=max(NEAR ** (exponent / 2.0), NEAR * (exponent - 1.0) / 2.0))
+
+
+@pytest.mark.parametrize("falls", friction.FALLS)
+def test_a_peak_is_one_at_its_largest_and_odd(falls):
+    v = np.linspace(-20.0, 20.0, 400_001)
+    motion = Motion.of([Moved(v, v, np.arange(len(v)) * 1e-3)])
+    force = friction.peak(motion, 1.0 / motion.v_rms, falls).along(motion.parts[0])
+    assert np.max(force) == pytest.approx(1.0, rel=1e-8) and force == pytest.approx(-force[::-1], abs=1e-12)
+    assert force[-1] < 2.0 / v[-1] ** 2
+
+
+def test_a_contact_that_is_lost_gradually():
+    """Far on either side it is the law with a corner; where that has it, rounding times ln 2 is lost, and half of the stiffness."""
+    part = Part(ROUNDED, ("stiffness", "N/m"), {"static": (0.2, "m"), "rounding": (0.05, "m")}, 1)
+    s = np.array([-1.0, 0.2 - 1e-6, 0.2, 0.2 + 1e-6, 1.5])
+    force = part.along(Moved(s, s, np.arange(5.0)))
+    assert force[[0, 4]] == pytest.approx([0.0, -1.3], abs=0.051 * np.exp(-24.0))
+    assert force[2] == pytest.approx(-0.05 * np.log(2.0)) and (force[3] - force[1]) / 2e-6 == pytest.approx(-0.5, rel=1e-5)
+
+
+@pytest.mark.parametrize("share", (0.05, 0.4))
+def test_a_load_that_is_put_on(share):
+    """Nothing at first, half of it at its time, all of it at the end. RK4 of der(elapsed) = 1 is exact."""
+    part = put_on(Motion.of([SWING]), share)
+    begin, time = (part.shapes[k][0] for k in ("begin", "time"))
+    assert part.along(SWING) == pytest.approx(0.5 + 0.5 * np.tanh((T - begin) / time), abs=1e-9)
