@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -188,26 +189,32 @@ def test_what_makes_up_for_a_curve_is_no_reason_for_a_simpler_one(share, kept):
 
 @dataclass(frozen=True)
 class Bench:
-    """Stub of a bench: its level and fit, and nothing to fit them with."""
+    """Stub of a bench whose fits gain what is written here, one after the other."""
 
     level: Level
-    fit: object
+    fit: SimpleNamespace
+    gains: list[float]
 
-    def problem(self) -> None:
-        return None
+    def problem(self) -> SimpleNamespace:
+        costs = itertools.accumulate(self.gains, initial=self.fit.cost)
+        next(costs)
+        return SimpleNamespace(solve=lambda free, by, iterations: SimpleNamespace(free=free, by=by, cost=next(costs)))
 
 
-def test_a_form_is_judged_at_the_likeliest_level_without_it(monkeypatch):
-    """The form before has let it fall: blocks look for larger levels from there."""
+@pytest.mark.parametrize("gains", ([0.5], [400.0, 30.0, 0.5]))
+def test_a_form_is_judged_at_the_likeliest_level_and_fit_without_it(monkeypatch, gains):
+    """The form before has let the level fall: blocks look for larger ones from there. A fit that has not converged goes on."""
     less, asked = Level(0.01, 1.0), []
-    monkeypatch.setattr(rounds, "fit_level", lambda bench, problem, fit, level: (less, SimpleNamespace(free=())))
+    monkeypatch.setattr(rounds, "fit_level", lambda bench, problem, fit, level: (less, fit))
 
     def wider(bench, problem, fit, level, sizes):
         asked.append((level, sizes))
         return level, fit, np.ones(4)
 
-    found, scores = rounds._based(Bench(Level(0.3, 1.0), None), SimpleNamespace(fit_level=wider))
-    assert (found.level, asked) == (less, [(less, rounds.levels(less))]) and scores.tolist() == [1.0] * 4
+    start = SimpleNamespace(free=(), by=None, cost=-1000.0)
+    found, scores = rounds._based(Bench(Level(0.3, 1.0), start, gains), SimpleNamespace(fit_level=wider))
+    assert (found.level, found.fit.cost, asked) == (less, -1000.0 + sum(gains), [(less, rounds.levels(less))])
+    assert scores.tolist() == [1.0] * 4
 
 
 @pytest.mark.parametrize(

@@ -15,11 +15,11 @@ from .adopting import adopt
 from .catalogue import curve
 from .evidence.bench import SIZES, Bench, fit_level
 from .evidence.blocks import BLOCKS, Blocks
-from .evidence.fit import Problem
+from .evidence.fit import Fit, Problem
 from .evidence.gain import Level
 from .evidence.prior import stated
 from .evidence.screening import Probe
-from .propose import PROMISE, is_part, motions, propose
+from .propose import FOLLOWED, PROMISE, is_part, motions, propose
 from .terms import Term, Trial
 from .worth import WORTH, Z_95, alone, least, mostly, share, undetermined, wrong
 
@@ -192,9 +192,20 @@ def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:
     """The bench with the level that predicts best, and its scores [blocks], less what parameters cost that are not what the file states.
     The likeliest comes first: a form that is new there lets it fall, which would count for the next form otherwise."""
     problem = bench.problem()
-    level, fit = fit_level(bench, problem, bench.fit, bench.level)
+    level, fit = _converged(bench, problem)
     level, fit, scores = blocks.fit_level(bench, problem, fit, level, levels(level))
     return replace(bench, level=level, fit=fit), scores - stated(fit.free) / len(scores)
+
+
+def _converged(bench: Bench, problem: Problem) -> tuple[Level, Fit]:
+    """The likeliest level and fit from those of a bench on, as long as going on gains PROMISE: along a narrow valley, the iterations of any
+    trial are progress too."""
+    level, fit, gained = bench.level, bench.fit, np.inf
+    while gained > PROMISE:
+        before = fit.cost
+        level, fit = fit_level(bench, problem, problem.solve(fit.free, fit.by, FOLLOWED), level)
+        gained = fit.cost - before
+    return level, fit
 
 
 def scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
