@@ -88,7 +88,8 @@ class Rounds:
             number = 1 + max((a.number for a in found), default=-1)
             bench, terms = adopt(bench, best, number)
             bench, scores = _based(bench, self.blocks)
-            found.append(Accepted(best, number, tuple(terms), good))
+            rivals = tuple(replace(t, blocks=scores) if t is best else t for t in good)  # with edges as steep as they are now
+            found.append(Accepted(best, number, tuple(terms), rivals))
             large.append(is_large(best, least(bench.level.size, best.whole)))
             hides = large[-1] or any(_hidden(t, best) for t in good)
             if not hides and not sure and not mostly(best.whole) and not _may_remain(bench, large, best):
