@@ -7,10 +7,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis.catalogue import friction, powers
-from penode_sil.diagnosis.catalogue.form import Motion, Moved, Part
+from penode_sil.diagnosis.catalogue import friction, powers, tyres
+from penode_sil.diagnosis.catalogue.form import Form, Motion, Moved, Part, Sizes
 from penode_sil.diagnosis.catalogue.loads import put_on
-from penode_sil.diagnosis.catalogue.tyres import ROUNDED
 
 T = np.linspace(0.0, 4.0, 4001)
 NEAR = 1e-6  # square of a thousandth
@@ -36,7 +35,7 @@ def test_a_peak_is_one_at_its_largest_and_odd(falls):
 
 def test_a_contact_that_is_lost_gradually():
     """Far on either side it is the law with a corner; where that has it, rounding times ln 2 is lost, and half of the stiffness."""
-    part = Part(ROUNDED, ("stiffness", "N/m"), {"static": (0.2, "m"), "rounding": (0.05, "m")}, 1)
+    part = Part(tyres.ROUNDED, ("stiffness", "N/m"), {"static": (0.2, "m"), "rounding": (0.05, "m")}, 1)
     s = np.array([-1.0, 0.2 - 1e-6, 0.2, 0.2 + 1e-6, 1.5])
     force = part.along(Moved(s, s, np.arange(5.0)))
     assert force[[0, 4]] == pytest.approx([0.0, -1.3], abs=0.051 * np.exp(-24.0))
@@ -49,3 +48,11 @@ def test_a_load_that_is_put_on(share):
     part = put_on(Motion.of([SWING]), share)
     begin, time = (part.shapes[k][0] for k in ("begin", "time"))
     assert part.along(SWING) == pytest.approx(0.5 + 0.5 * np.tanh((T - begin) / time), abs=1e-9)
+
+
+@pytest.mark.parametrize("own, preload", (({"linear_spring.stiffness": 2e5}, 2000.0), ({}, 500.0)))
+def test_the_preload_of_a_tyre_is_that_of_its_spring(own, preload):
+    """One that keeps three quarters of its stiffness in the air has no less on the road; without a linear spring what is lost counts."""
+    form = Form(tyres.KINDS[1], "tyre", "force", 0)
+    values = {(0, "stiffness"): 5e4, (0, "static"): 0.01}
+    assert tyres.sizes(form, Sizes(values, own, moving=True)) == {"preload": ("N", pytest.approx(preload))}

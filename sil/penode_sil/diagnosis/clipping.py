@@ -46,7 +46,7 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score
         return [s.gain for s in as_they_are(bench.fit, changes)]
 
     gains, soft = gained(limits, np.inf), limits[-1:]
-    if len(bench.nominal) == len(bench.fit.free) and _largest(bench, index) - limits[0] < 3.0 * bench.noise[index]:
+    if len(bench.nominal) == len(bench.fit.free) and _within(bench, index, limits[0]):
         gains = [max(pair) for pair in zip(gains, _gains_of_nominal(bench, index, limits), strict=True)]
     found = []
     for each, sizes, note in ((gains, limits, ""), (gained(soft, SHARP), soft, SOFT)):
@@ -95,12 +95,14 @@ def expression(signal: str, limit: str, sharp: str = "") -> str:
 
 def is_possible(bench: Bench, form: Form, limit: float) -> bool:
     """Has a sensor all samples within a limit, but for noise and a few that are far out? A friction looks like one that many are beyond."""
-    return bool(_largest(bench, form.index) <= limit + 3.0 * bench.noise[form.index])
+    return _within(bench, form.index, limit)
 
 
-def _largest(bench: Bench, index: int) -> float:
-    """What hardly any sample of a sensor exceeds."""
-    return float(np.nanquantile(np.abs(np.concatenate([r.y[:, index] for r in bench.records])), 0.998))
+def _within(bench: Bench, index: int, limit: float) -> bool:
+    """Does hardly any sample of a sensor exceed a limit by more than three deviations of its noise?"""
+    y = np.concatenate([r.y[:, index] for r in bench.records])
+    most = limit + 3.0 * bench.noise[index]
+    return bool(np.nanquantile(np.abs(y), 0.998) <= most)
 
 
 def share(bench: Bench, form: Form, limit: Free, sharp: float = np.inf) -> float:

@@ -96,9 +96,9 @@ def _corrected_less(bench: Bench, stiffer: float) -> Bench:
 
 def _chosen(ranked: Sequence[tuple[Score, Form]]) -> list[tuple[Score, Form]]:
     """The forms that are fitted: of each kind, place and note the best; of these the TRIED with the largest gain beyond PROMISE for each of
-    their sizes, no more than half of them of one curve at a place, the best force of every place that is not among them, for small
-    improvements where much acts would crowd out the cause where little does, what is a part of one of them, and the best limit of every
-    other input and sensor: little else does what they do."""
+    their sizes, no more than half of them of one curve at a place, and forms of one fault of an input or a sensor for one; the best force
+    of every place that is not among them, for small improvements where much acts would crowd out the cause where little does, what is a
+    part of one of them, and the best limit of every other input and sensor: little else does what they do."""
     best: dict[tuple[str, str, str], tuple[Score, Form]] = {}
     for score, form in ranked:
         if score.gain > PROMISE:

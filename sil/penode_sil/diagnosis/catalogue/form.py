@@ -124,9 +124,9 @@ class Series:
 @dataclass(frozen=True, eq=False)
 class Form:
     """A form of a kind at a place of the model (its index), an input or a sensor (its index): `how` is "force", or what is wrong with the
-    input (a key of ACTUATORS, or "input_added": a `series`) or sensor ("scale", "late", "clip": beyond a `limit`). `limit`: where the fit
-    of a value begins whose effect is not proportional to it. Of one family, forms stand for the same name. `alike`: kinds and places of
-    what does the same beside another form."""
+    input (a key of ACTUATORS, or "input_added": a `series`) or sensor ("scale", "late", "lag", "clip": beyond a `limit`). `limit`: where
+    the fit of a value begins whose effect is not proportional to it. Of one family, forms stand for the same name. `alike`: kinds and
+    places of what does the same beside another form."""
 
     kind: str
     where: str

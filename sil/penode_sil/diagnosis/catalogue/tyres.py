@@ -58,7 +58,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
-    """See Kind."""
+    """See Kind. A tyre leaves the road where its own spring has lost its load, however much of that it is seen to lose."""
     if form.note == "rounded":
         return {"stretch": ("m", v(0, "static"))}
     if form.kind == KINDS[1]:
