@@ -16,7 +16,7 @@ import penode_gen
 from penode_gen.model import GROUND, Model
 from penode_sil.diagnosis import catalogue
 from penode_sil.diagnosis.catalogue import actuators, channels, drives, form, networks, others
-from penode_sil.diagnosis.plant import Place, places
+from penode_sil.diagnosis.plant.plant import Place, places
 from penode_sil.diagnosis.result import plain
 
 ROOT = Path(__file__).resolve().parents[2]

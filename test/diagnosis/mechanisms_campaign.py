@@ -26,8 +26,8 @@ from mechanisms.generator import KINDS, WHERE, Case, cases
 import penode_gen
 from penode_gen.model import GROUND, Model
 from penode_sil import diagnosis
-from penode_sil.diagnosis import noise, study
-from penode_sil.diagnosis.missing import missing_forces
+from penode_sil.diagnosis.study import noise, study
+from penode_sil.diagnosis.study.missing import missing_forces
 from penode_sil.recordings.measured import load
 
 HERE = Path(__file__).resolve().parent

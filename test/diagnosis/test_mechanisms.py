@@ -7,7 +7,7 @@ import pytest
 from mechanisms import generator
 from mechanisms_campaign import LIMIT, model_of, score
 
-from penode_sil.diagnosis import missing
+from penode_sil.diagnosis.study import missing
 
 
 @pytest.mark.parametrize(

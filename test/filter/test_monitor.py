@@ -21,7 +21,7 @@ from penode_gen.emission.model_c import render
 from penode_gen.errors import ModelError
 from penode_gen.laws import LAWS
 from penode_gen.model import Element
-from penode_sil.diagnosis import monitored
+from penode_sil.diagnosis.extend import monitored
 from penode_sil.filtering import exact_monitor
 from penode_sil.filtering.compiled import Compiled
 from penode_sil.filtering.watched import FLAGS, CompiledMonitor, names

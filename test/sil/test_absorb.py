@@ -18,7 +18,7 @@ from penode_gen.networks import Affine, Dense, Network
 from penode_gen.reading.json_file import read_json
 from penode_gen.sets import fold, packing
 from penode_sil import diagnosis
-from penode_sil.diagnosis import absorb
+from penode_sil.diagnosis.extend import absorb
 from penode_sil.recordings.measured import load
 
 PICK = np.random.default_rng(5)

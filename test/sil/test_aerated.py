@@ -11,8 +11,10 @@ import pytest
 from samples import sample
 
 import penode_gen
-from penode_sil.diagnosis import driven, plant, real
 from penode_sil.diagnosis.catalogue.form import Moved, Part
+from penode_sil.diagnosis.plant import plant
+from penode_sil.diagnosis.search import naming
+from penode_sil.diagnosis.study import driven
 from penode_sil.recordings.measured import load
 
 RIG = """
@@ -73,7 +75,7 @@ def test_a_damper_that_has_lost_oil_is_found(tmp_path, gas, show):
     model, experiments = rig(tmp_path, gas, 5)
     places = plant.places(model)
     fastest = plant.linearise(model, places, np.array([model.start]), experiments[0].u[:1]).fastest
-    found = real.answer(model, places, experiments, fastest, "default", lambda text: None)
+    found = naming.answer(model, places, experiments, fastest, "default", lambda text: None)
     show([(c.kind, c.where, {k: v.value for k, v in c.parameters.items()}) for c in found.causes])
     assert [(c.kind, c.where) for c in found.causes] == ([("aerated_damper", "damper")] if gas else [])
 

@@ -17,15 +17,16 @@ from test_innovations import swing
 import penode_gen
 from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
-from penode_sil.diagnosis import adopting, applied, clipping
-from penode_sil.diagnosis.between import finer, joined, parts, straight
 from penode_sil.diagnosis.catalogue.actuators import lagging
 from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence import gain, samples
 from penode_sil.diagnosis.evidence.fit import Fit
 from penode_sil.diagnosis.evidence.observer import Filter, Predictor, Record, alike, augmented, scale
-from penode_sil.diagnosis.fit import Free
-from penode_sil.diagnosis.terms import Term
+from penode_sil.diagnosis.extend import applied
+from penode_sil.diagnosis.plant.between import finer, joined, parts, straight
+from penode_sil.diagnosis.search import adopting, clipping
+from penode_sil.diagnosis.search.terms import Term
+from penode_sil.diagnosis.study.fit import Free
 
 STEP = 2e-3
 TIME = np.arange(400) * STEP

@@ -9,7 +9,7 @@ import pytest
 
 from penode_sil.diagnosis.catalogue import networks, stem
 from penode_sil.diagnosis.catalogue.form import Motion, Moved, Sizes
-from penode_sil.diagnosis.plant import Place
+from penode_sil.diagnosis.plant.plant import Place
 
 T = np.linspace(0.0, 1.0, 2001)
 

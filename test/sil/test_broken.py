@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import broken
+from penode_sil.diagnosis.checks import broken
 
 ROWS = 10_000
 

@@ -9,10 +9,10 @@ from types import SimpleNamespace as Simple
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import dropouts
-from penode_sil.diagnosis.broken import WILD, still_wild
-from penode_sil.diagnosis.dropouts import bursts, repeats
-from penode_sil.diagnosis.noise import Experiment
+from penode_sil.diagnosis.checks import dropouts
+from penode_sil.diagnosis.checks.broken import WILD, still_wild
+from penode_sil.diagnosis.checks.dropouts import bursts, repeats
+from penode_sil.diagnosis.study.noise import Experiment
 
 STEP, N = 2e-3, 10_000
 T = np.arange(N) * STEP

@@ -14,7 +14,7 @@ from samples import sample
 from scipy.signal import StateSpace, lsim
 
 from penode_sil.cli import main
-from penode_sil.diagnosis.plausible import mixed, off_by
+from penode_sil.diagnosis.checks.plausible import mixed, off_by
 
 STEP, SAMPLES, G = 2e-3, 3000, 9.80665
 NOISE = {"a_body": 0.02, "a_wheel": 0.1, "deflection": 1e-4}

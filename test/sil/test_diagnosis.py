@@ -20,12 +20,15 @@ from scipy.signal import lfilter, lsim
 
 import penode_gen
 from penode_sil import diagnosis
-from penode_sil.diagnosis import dropouts, late, measuring, noise, plant, study
 from penode_sil.diagnosis.catalogue import memory
-from penode_sil.diagnosis.compiling import longest
-from penode_sil.diagnosis.driven import experiment
-from penode_sil.diagnosis.fit import Fit, Free, Problem
-from penode_sil.diagnosis.leftover import only_noise
+from penode_sil.diagnosis.checks import dropouts
+from penode_sil.diagnosis.checks.leftover import only_noise
+from penode_sil.diagnosis.extend import late, measuring
+from penode_sil.diagnosis.plant import plant
+from penode_sil.diagnosis.plant.compiling import longest
+from penode_sil.diagnosis.study import noise, study
+from penode_sil.diagnosis.study.driven import experiment
+from penode_sil.diagnosis.study.fit import Fit, Free, Problem
 from penode_sil.recordings.measured import load
 
 M_B, M_W, C, D, C_T = 400.0, 45.0, 22e3, 1500.0, 210e3

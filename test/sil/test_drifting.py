@@ -11,7 +11,10 @@ from samples import sample
 from scipy.signal import StateSpace, lsim
 
 import penode_gen
-from penode_sil.diagnosis import applied, driven, plant, real
+from penode_sil.diagnosis.extend import applied
+from penode_sil.diagnosis.plant import plant
+from penode_sil.diagnosis.search import naming
+from penode_sil.diagnosis.study import driven
 from penode_sil.recordings.measured import load
 
 MASS, STIFFNESS, DAMPING, SECONDS, FINE = 2.0, 1800.0, 20.0, 12.0, 4
@@ -40,7 +43,7 @@ def answer(folder, slow, late, seed):
     experiments = [driven.experiment(m, known) for m in load([folder / "r.csv"], known)]
     places = plant.places(known)
     fastest = plant.linearise(known, places, np.array([known.start]), experiments[0].u[:1]).fastest
-    return known, real.answer(known, places, experiments, fastest, "default", lambda text: None)
+    return known, naming.answer(known, places, experiments, fastest, "default", lambda text: None)
 
 
 @pytest.mark.parametrize("slow", sample([2e-3, -2e-3], 2e-3))

@@ -15,15 +15,17 @@ import pytest
 from samples import sample
 
 import penode_gen
-from penode_sil.diagnosis import driven, plant, propose, real, rounds, worth
 from penode_sil.diagnosis.catalogue.form import Form
 from penode_sil.diagnosis.evidence.bench import build
 from penode_sil.diagnosis.evidence.fit import Fit, likelihood
 from penode_sil.diagnosis.evidence.gain import Level
 from penode_sil.diagnosis.evidence.observer import Record, sample_noise
 from penode_sil.diagnosis.evidence.screening import Score
-from penode_sil.diagnosis.fit import Free
-from penode_sil.diagnosis.terms import Trial
+from penode_sil.diagnosis.plant import plant
+from penode_sil.diagnosis.search import naming, propose, rounds, worth
+from penode_sil.diagnosis.search.terms import Trial
+from penode_sil.diagnosis.study import driven
+from penode_sil.diagnosis.study.fit import Free
 from penode_sil.recordings.measured import load
 
 J_M, J_L, K, D, D_M, D_L = 0.02, 0.1, 40.0, 0.07, 0.04, 0.4
@@ -95,7 +97,7 @@ def fastest(model, experiments):
 
 
 def answered(model, experiments):
-    return real.answer(model, plant.places(model), experiments, fastest(model, experiments), "default", lambda text: None)
+    return naming.answer(model, plant.places(model), experiments, fastest(model, experiments), "default", lambda text: None)
 
 
 def waves(size, s):

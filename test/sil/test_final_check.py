@@ -16,14 +16,15 @@ from scipy.signal import butter, lfilter
 
 import penode_gen
 from penode_sil.cli import cli
-from penode_sil.diagnosis import diagnose, study
+from penode_sil.diagnosis import diagnose
 from penode_sil.diagnosis.checks import final, rules
 from penode_sil.diagnosis.checks.case import Case, End
 from penode_sil.diagnosis.checks.differing import common
 from penode_sil.diagnosis.checks.written import write_extended
-from penode_sil.diagnosis.driven import experiment
-from penode_sil.diagnosis.entries import extends
+from penode_sil.diagnosis.extend.entries import extends
 from penode_sil.diagnosis.result import Cause, Diagnosis, Gain, Value
+from penode_sil.diagnosis.study import study
+from penode_sil.diagnosis.study.driven import experiment
 from penode_sil.recordings.measured import load
 
 MASS, STIFFNESS, DAMPING, NOISE = 2.0, 800.0, 12.0, 2e-5

@@ -11,7 +11,9 @@ import pytest
 from one_mass import STEP, model
 
 import penode_gen
-from penode_sil.diagnosis import driven, plant, real
+from penode_sil.diagnosis.plant import plant
+from penode_sil.diagnosis.search import naming
+from penode_sil.diagnosis.study import driven
 from penode_sil.recordings.measured import load
 
 MASS, STIFFNESS, DAMPING, SECONDS, FINE = 20.0, 5000.0, 300.0, 16.0, 10
@@ -50,7 +52,7 @@ def test_a_damper_that_its_work_warms_is_found(tmp_path, show):
     known, experiments, lost = rig(tmp_path, 0.06, 5)
     places = plant.places(known)
     fastest = plant.linearise(known, places, np.array([known.start]), experiments[0].u[:1]).fastest
-    found = real.answer(known, places, experiments, fastest, "default", lambda text: None)
+    found = naming.answer(known, places, experiments, fastest, "default", lambda text: None)
     show([(c.kind, c.where, {k: (v.value, v.ci95) for k, v in c.parameters.items()}) for c in found.causes])
     (cause,) = found.causes
     assert (cause.kind, cause.where) == ("damper_fading", "damper")

@@ -15,9 +15,12 @@ from scipy.signal import StateSpace, lsim
 
 import penode_gen
 from penode_sil.batch import Batch
-from penode_sil.diagnosis import applied, driven, plant, real
-from penode_sil.diagnosis.holding import held
-from penode_sil.diagnosis.noise import Experiment
+from penode_sil.diagnosis.extend import applied
+from penode_sil.diagnosis.plant import plant
+from penode_sil.diagnosis.search import naming
+from penode_sil.diagnosis.search.holding import held
+from penode_sil.diagnosis.study import driven
+from penode_sil.diagnosis.study.noise import Experiment
 from penode_sil.recordings.measured import load
 
 FINE, SAMPLES = 8, 4000  # steps of the plant in a sample, samples
@@ -61,12 +64,12 @@ def answer(tmp_path: Path):
     (tmp_path / "rig.toml").write_text(MODEL)
     rig = penode_gen.load(tmp_path / "rig.toml")
 
-    def search(how: str, period: float, seed: int, top: float = 6.0) -> real.Answer:
+    def search(how: str, period: float, seed: int, top: float = 6.0) -> naming.Answer:
         (m,) = load([recording(tmp_path / "r.csv", how, period, seed, top)], rig)
         e: Experiment = driven.experiment(m, rig)
         places = plant.places(rig)
         fastest = plant.linearise(rig, places, np.array([rig.start]), e.u[:1]).fastest
-        return real.answer(rig, places, [e], fastest, "default", lambda text: None)
+        return naming.answer(rig, places, [e], fastest, "default", lambda text: None)
 
     return search
 

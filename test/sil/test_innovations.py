@@ -18,15 +18,18 @@ from scipy import linalg, stats
 import penode_gen
 from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
-from penode_sil.diagnosis import driven, holding, leftover, plant, real
 from penode_sil.diagnosis.catalogue import FILES, drives
 from penode_sil.diagnosis.catalogue.actuators import Drive
 from penode_sil.diagnosis.catalogue.form import Motion, Moved
+from penode_sil.diagnosis.checks import leftover
 from penode_sil.diagnosis.evidence import bench, blocks
 from penode_sil.diagnosis.evidence.bench import with_tolerances
 from penode_sil.diagnosis.evidence.gain import Gains, Level, riccati
 from penode_sil.diagnosis.evidence.observer import Record, augmented, sample_noise
-from penode_sil.diagnosis.study import begin
+from penode_sil.diagnosis.plant import plant
+from penode_sil.diagnosis.search import holding, naming
+from penode_sil.diagnosis.study import driven
+from penode_sil.diagnosis.study.study import begin
 from penode_sil.recordings.measured import load
 
 SWING = """
@@ -77,7 +80,7 @@ def swing(folder, torque, seed=1, k=0.64, tolerance=", tolerance = 0.05", second
 def answered(model, experiments):
     places = plant.places(model)
     fastest = plant.linearise(model, places, np.array([model.start]), experiments[0].u[:1]).fastest
-    return real.answer(model, places, experiments, fastest, "default", lambda text: None)
+    return naming.answer(model, places, experiments, fastest, "default", lambda text: None)
 
 
 def test_steady_gain_is_that_of_the_recursion():

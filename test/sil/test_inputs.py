@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import noise
+from penode_sil.diagnosis.study import noise
 
 STEP, SAMPLES, SIGMA = 0.001, 20_000, 3e-5
 TIME = STEP * np.arange(SAMPLES)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from penode_sil.diagnosis.noise import prepare, sensor_levels
+from penode_sil.diagnosis.study.noise import prepare, sensor_levels
 
 STEP, SAMPLES, DECLARED = 0.002, 15_000, 1.0
 ROOM = 1.25**2 - 1.0  # for slow noise: a sensor of white noise as declared may have a quarter more

@@ -10,7 +10,7 @@ from curves import curve, integrate
 
 import penode_gen
 from penode_sil.diagnosis import diagnose
-from penode_sil.diagnosis.plant import places
+from penode_sil.diagnosis.plant.plant import places
 from penode_sil.recordings.measured import load
 
 STEP, SAMPLES, MASS, NOISE = 2e-3, 3000, 2.0, 2e-5

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis.measuring import achieved
+from penode_sil.diagnosis.extend.measuring import achieved
 
 
 def test_gained_share_has_an_interval():

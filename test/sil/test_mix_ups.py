@@ -16,7 +16,7 @@ import penode_gen
 from penode_sil.cli import cli
 from penode_sil.diagnosis.checks.channels import Mix, mending, mixed
 from penode_sil.diagnosis.checks.written import joined
-from penode_sil.diagnosis.driven import experiment
+from penode_sil.diagnosis.study.driven import experiment
 from penode_sil.errors import RecordingError
 from penode_sil.recordings.measured import load
 

@@ -11,7 +11,7 @@ from scipy import signal
 
 import penode_gen
 from penode_sil.diagnosis import engine
-from penode_sil.diagnosis.input_noise import with_noise_of_inputs
+from penode_sil.diagnosis.study.input_noise import with_noise_of_inputs
 from penode_sil.recordings.measured import load
 
 RIG = """

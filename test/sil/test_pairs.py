@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import rounds
 from penode_sil.diagnosis.catalogue.form import Form
 from penode_sil.diagnosis.evidence.gain import Level
-from penode_sil.diagnosis.fit import Free
-from penode_sil.diagnosis.rounds import Rounds
-from penode_sil.diagnosis.terms import Term, Trial
-from penode_sil.diagnosis.worth import WORTH
+from penode_sil.diagnosis.search import rounds
+from penode_sil.diagnosis.search.rounds import Rounds
+from penode_sil.diagnosis.search.terms import Term, Trial
+from penode_sil.diagnosis.search.worth import WORTH
+from penode_sil.diagnosis.study.fit import Free
 
 
 def trial(kind: str, nats: float) -> Trial:

@@ -11,9 +11,9 @@ import pytest
 
 import penode_gen
 from penode_gen.model import Element
-from penode_sil.diagnosis import plant
 from penode_sil.diagnosis.evidence import bench
 from penode_sil.diagnosis.evidence.observer import Record, augmented, with_probes
+from penode_sil.diagnosis.plant import plant
 
 RIG = Path(__file__).resolve().parents[1] / "diagnosis" / "rigs" / "labcontrol_mr"  # its model: spring and damper, whose motion is an input
 

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import clipping, propose
 from penode_sil.diagnosis.catalogue.form import Form
 from penode_sil.diagnosis.evidence.screening import Score
+from penode_sil.diagnosis.search import clipping, propose
 
 
 @pytest.mark.parametrize("limit, possible", [(1.0, True), (0.97, True), (0.9, False)])

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_sil.diagnosis import plant, propose, rounds
 from penode_sil.diagnosis.catalogue import springs
 from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
+from penode_sil.diagnosis.plant import plant
 from penode_sil.diagnosis.result import Cause, Value
-from penode_sil.diagnosis.terms import Term, Trial
+from penode_sil.diagnosis.search import propose, rounds
+from penode_sil.diagnosis.search.terms import Term, Trial
 
 PLANT = """
 [model]

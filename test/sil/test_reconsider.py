@@ -12,15 +12,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis import rounds
 from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence.gain import Level
-from penode_sil.diagnosis.fit import Free
-from penode_sil.diagnosis.innovate import _own_names
-from penode_sil.diagnosis.reconsider import reconsidered
-from penode_sil.diagnosis.rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, _is_sure, simplest
-from penode_sil.diagnosis.terms import Term, Trial
-from penode_sil.diagnosis.worth import WORTH
+from penode_sil.diagnosis.search import rounds
+from penode_sil.diagnosis.search.innovate import _own_names
+from penode_sil.diagnosis.search.reconsider import reconsidered
+from penode_sil.diagnosis.search.rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, _is_sure, simplest
+from penode_sil.diagnosis.search.terms import Term, Trial
+from penode_sil.diagnosis.search.worth import WORTH
+from penode_sil.diagnosis.study.fit import Free
 
 NAMES = {
     "friction": "coulomb_friction",

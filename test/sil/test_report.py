@@ -18,8 +18,9 @@ from test_diagnosis import MODEL, SAMPLES, STEP, drive, record, road
 import penode_gen
 from penode_sil import building
 from penode_sil.cli import cli
-from penode_sil.diagnosis import advice, catalogue, files, noise, reliability, report, residual, restoring, result, terminal
+from penode_sil.diagnosis import advice, catalogue, files, reliability, report, result, terminal
 from penode_sil.diagnosis.report import changes, figure as fig, panels
+from penode_sil.diagnosis.study import noise, residual, restoring
 
 RECORDING = "track <2> & more.csv"  # a name that HTML has to escape
 EXTENDED = """# Extension of car.toml from recordings: coulomb_friction at damper.

@@ -14,10 +14,10 @@ import pytest
 from test_diagnosis import MODEL, drive, record, road
 
 import penode_gen
-from penode_sil.diagnosis import residual, restoring, study
 from penode_sil.diagnosis.catalogue import MEANING, experiments
-from penode_sil.diagnosis.driven import experiment
 from penode_sil.diagnosis.report import figure as fig, forces, panels
+from penode_sil.diagnosis.study import residual, restoring, study
+from penode_sil.diagnosis.study.driven import experiment
 from penode_sil.recordings.measured import load
 
 FACTOR = 3.0  # between an axis and what is drawn in it

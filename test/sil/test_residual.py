@@ -10,8 +10,8 @@ from scipy import stats
 from test_diagnosis import MODEL, SAMPLES, STEP, C, D, drive, record, road
 
 import penode_gen
-from penode_sil.diagnosis import noise, residual, restoring, study
-from penode_sil.diagnosis.driven import experiment
+from penode_sil.diagnosis.study import noise, residual, restoring, study
+from penode_sil.diagnosis.study.driven import experiment
 from penode_sil.recordings.measured import load
 
 N, H = 40_000, 2e-3  # samples, interval [s]

@@ -12,9 +12,9 @@ import pytest
 
 import penode_gen
 from penode_gen.model import Parameter
-from penode_sil.diagnosis.driven import experiment
-from penode_sil.diagnosis.plant import placeless
-from penode_sil.diagnosis.study import null_study, uncertain
+from penode_sil.diagnosis.plant.plant import placeless
+from penode_sil.diagnosis.study.driven import experiment
+from penode_sil.diagnosis.study.study import null_study, uncertain
 from penode_sil.recordings.measured import load
 
 HERE = Path(__file__).resolve().parent

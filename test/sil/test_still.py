@@ -15,7 +15,7 @@ from scipy.signal import StateSpace, lsim
 
 import penode_gen
 from penode_sil.cli import main
-from penode_sil.diagnosis.still import with_noise_at_rest
+from penode_sil.diagnosis.study.still import with_noise_at_rest
 from penode_sil.errors import UserError
 from penode_sil.recordings.measured import load
 

@@ -13,7 +13,7 @@ import pytest
 from one_mass import STEP, model
 from samples import sample
 
-from penode_sil.diagnosis import straight
+from penode_sil.diagnosis.search import straight
 
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 12.0
 SENSORS = 'x = { value = "x", unit = "m", noise = 1e-5 }'

@@ -9,8 +9,8 @@ import pytest
 from samples import sample
 from scipy import signal
 
-from penode_sil.diagnosis.noise import Experiment, Metric
-from penode_sil.diagnosis.tones import DETECTED, Tone, tone
+from penode_sil.diagnosis.checks.tones import DETECTED, Tone, tone
+from penode_sil.diagnosis.study.noise import Experiment, Metric
 
 
 def recording(u: np.ndarray, y: np.ndarray, step: float) -> Experiment:

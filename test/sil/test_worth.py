@@ -12,9 +12,9 @@ import pytest
 from penode_sil.diagnosis.evidence import prior
 from penode_sil.diagnosis.evidence.colour import Colour
 from penode_sil.diagnosis.evidence.observer import Record
-from penode_sil.diagnosis.fit import Free
-from penode_sil.diagnosis.offsets import shifts
-from penode_sil.diagnosis.worth import own, remaining
+from penode_sil.diagnosis.search.offsets import shifts
+from penode_sil.diagnosis.search.worth import own, remaining
+from penode_sil.diagnosis.study.fit import Free
 
 
 def fit(columns, free):

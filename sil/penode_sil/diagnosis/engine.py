@@ -19,19 +19,19 @@ from penode_gen.model import Model
 
 from ..errors import RecordingError
 from ..recordings.measured import Measured, with_shared_rails
-from . import dropouts, plausible, verdict
+from . import verdict
 from .advice import advised
-from .broken import broken_sensors, still_broken
-from .checks import channels as mix_ups, differing, final
+from .checks import channels as mix_ups, differing, dropouts, final, plausible
+from .checks.broken import broken_sensors, still_broken
 from .checks.case import Case, End
-from .driven import settled
 from .evidence.bench import with_tolerances
-from .fit import Fit
-from .input_noise import with_noise_of_inputs
-from .noise import Experiment
 from .result import Cause, Diagnosis, Recorded
-from .study import Study, begin, guessed
-from .worth import WORTH
+from .search.worth import WORTH
+from .study.driven import settled
+from .study.fit import Fit
+from .study.input_noise import with_noise_of_inputs
+from .study.noise import Experiment
+from .study.study import Study, begin, guessed
 
 SEARCH = 0.15, 0.8  # where in the whole work the search begins and ends, about
 AGAIN = 3  # times that bursts are looked for in what is left without them

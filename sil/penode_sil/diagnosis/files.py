@@ -16,10 +16,11 @@ import penode_gen
 from ..errors import WrongUse, hint
 from ..recordings.excerpt import excerpted
 from ..recordings.measured import load
-from . import monitored, report
+from . import report
 from .engine import diagnose
+from .extend import monitored
 from .result import Diagnosis
-from .still import with_noise_at_rest
+from .study.still import with_noise_at_rest
 
 
 @dataclass(frozen=True)

@@ -12,27 +12,31 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model
 
-from . import absorb, applied, leftover, measuring, nameless, numerics, plant, plausible, real, residual, tones
 from .catalogue import drives, others, values as of_values
+from .checks import leftover, numerics, plausible, tones
 from .checks.case import Case, End
 from .checks.written import write_extended
 from .evidence.bench import UNSTATED
-from .fit import Fit
-from .residual import Channel
-from .resolving import resolved
+from .extend import absorb, applied, measuring, nameless
+from .extend.resolving import resolved
+from .plant import plant
 from .result import EXTENDED, UNKNOWN, Cause, Diagnosis, Gain, Named
-from .study import Study, fitted, guessed, look
-from .worth import WORTH
+from .search import naming
+from .search.worth import WORTH
+from .study import residual
+from .study.fit import Fit
+from .study.residual import Channel
+from .study.study import Study, fitted, guessed, look
 
 Array = NDArray[np.float64]
 Broken = Callable[[Fit], Sequence[Cause]]
 ENOUGH = 0.85  # share of the avoidable residual that named causes must take away to be an explanation at all
 
 
-def searched(case: Case, study: Study) -> real.Answer:
+def searched(case: Case, study: Study) -> naming.Answer:
     """What the search finds."""
     case.tell(0.3, "searching with an observer that follows unmodelled forces")
-    return real.answer(case.model, study.places, study.experiments, study.linear.fastest, study.set_name, case.log, study.levels)
+    return naming.answer(case.model, study.places, study.experiments, study.linear.fastest, study.set_name, case.log, study.levels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +70,7 @@ class Written:
         return Written(text, extended, gain, notes, held)
 
 
-def conclude(case: Case, study: Study, found: real.Answer, broken: Broken) -> End:
+def conclude(case: Case, study: Study, found: naming.Answer, broken: Broken) -> End:
     """The end of a search; without pictures, recordings and time. `broken`: sensors at fault beside a fit."""
     study = replace(study, model=case.model)
     study = replace(study, seen=look(study, study.null))
@@ -115,7 +119,7 @@ def conclude(case: Case, study: Study, found: real.Answer, broken: Broken) -> En
     )
 
 
-def _judged(study: Study, measured: Study, found: real.Answer, after: Sequence[Array], faults: Sequence[Cause]) -> Judged:
+def _judged(study: Study, measured: Study, found: naming.Answer, after: Sequence[Array], faults: Sequence[Cause]) -> Judged:
     """The judgement of a search that leads to a simulation `after`, beside `faults` of sensors."""
     model = study.model
     causes, notes = _plausible(model, found.causes)
@@ -144,7 +148,7 @@ def _better(written: Written) -> bool:
     return bool(written.gain) and all(g.after_rmse < g.before_rmse for g in written.gain.values())
 
 
-def _unnamed(case: Case, study: Study, found: real.Answer) -> tuple[Written, float, str] | None:
+def _unnamed(case: Case, study: Study, found: naming.Answer) -> tuple[Written, float, str] | None:
     """The extended model with a network for what has no name, the share of the residual that it takes, and a note; None where it takes too
     little, or does not predict the hold-out better than the nominal model."""
     case.tell(0.83, "fitting what has no name")
@@ -214,7 +218,7 @@ def _explanations(causes: Sequence[Cause], sets: Sequence[tuple[tuple[Named, ...
     return tuple(found)
 
 
-def _verdict(found: real.Answer, causes: tuple[Cause, ...], share: float, quiet: bool) -> str:
+def _verdict(found: naming.Answer, causes: tuple[Cause, ...], share: float, quiet: bool) -> str:
     """From what is named, the share of the residual that it takes in a free run, and whether noise is all that is left (`quiet`)."""
     if causes:
         return "explained" if share > ENOUGH else "partly_explained"

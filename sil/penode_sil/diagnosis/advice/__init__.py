@@ -13,9 +13,9 @@ from penode_gen.model import Model
 from ..catalogue import channels, separating
 from ..catalogue.drives import alike
 from ..catalogue.experiments import proposed
-from ..noise import UNSEEN
 from ..reliability import reliability
 from ..result import OUTSIDE, Cause, Diagnosis, Named, place
+from ..study.noise import UNSEEN
 
 FARTHER = 0.02  # share of samples outside of the training, above which a hold-out is no evidence for a name
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from penode_gen.model import GROUND, Model
 
-from ..plant import Place
+from ..plant.plant import Place
 from . import friction, powers
 from .form import Form, Motion, Part, Sizes
 

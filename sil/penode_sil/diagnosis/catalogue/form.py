@@ -15,7 +15,7 @@ from penode_gen import laws
 from penode_gen.model import Model
 from penode_gen.twins.numeric import along
 
-from ..plant import Place
+from ..plant.plant import Place
 from . import memory
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from penode_gen.model import GROUND, Model
 
-from ..plant import Place
+from ..plant.plant import Place
 from . import loads
 from .form import Form, Motion, Part, Sizes
 

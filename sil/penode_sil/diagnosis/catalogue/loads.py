@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from penode_gen.model import GROUND, Model
 
-from ..plant import Place
+from ..plant.plant import Place
 from ..result import Cause, Named, Value
 from .form import Form, Motion, Part, Sizes
 

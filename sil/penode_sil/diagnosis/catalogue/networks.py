@@ -8,7 +8,7 @@ import numpy as np
 
 from penode_gen.model import Model
 
-from ..plant import Place
+from ..plant.plant import Place
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("network_extrapolation",)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from penode_gen.model import Model
 
-from ..plant import Place
+from ..plant.plant import Place
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("backlash",)

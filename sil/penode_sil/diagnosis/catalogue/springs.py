@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from penode_gen.model import Model
 
-from ..plant import Place
+from ..plant.plant import Place
 from . import powers
 from .form import Form, Motion, Part, Sizes
 

@@ -11,11 +11,11 @@ from pathlib import Path
 from penode_gen.model import Model
 
 from ...recordings.measured import Measured
-from ..fit import Fit
-from ..noise import Experiment
-from ..residual import Channel
 from ..result import Cause, Diagnosis
-from ..study import Study
+from ..study.fit import Fit
+from ..study.noise import Experiment
+from ..study.residual import Channel
+from ..study.study import Study
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,15 +18,15 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from ...errors import RecordingError
-from .. import applied
 from ..catalogue import channels
-from ..entries import extends, table
-from ..fit import Free, Problem
-from ..noise import Experiment, metric
-from ..plausible import LITTLE, UNLIKE
+from ..extend import applied
+from ..extend.entries import extends, table
 from ..result import OUTSIDE, Cause, Diagnosis
-from ..study import guessed, uncertain
-from ..worth import RIGHT
+from ..search.worth import RIGHT
+from ..study.fit import Free, Problem
+from ..study.noise import Experiment, metric
+from ..study.study import guessed, uncertain
+from .plausible import LITTLE, UNLIKE
 
 Array = NDArray[np.float64]
 

@@ -13,16 +13,17 @@ import numpy as np
 from penode_gen import units
 from penode_gen.model import Parameter
 
-from .. import measuring, numerics
-from ..entries import table, toml, unlike
-from ..fit import Fit, Free, Problem
-from ..leftover import CHANCE, chi2, rows
-from ..noise import UNSEEN
-from ..residual import rms, stated_noise
+from ..extend import measuring
+from ..extend.entries import table, toml, unlike
 from ..result import Cause, Diagnosis, Named, Value
-from ..study import Study, look
-from ..worth import RIGHT, Z_95
+from ..search.worth import RIGHT, Z_95
+from ..study.fit import Fit, Free, Problem
+from ..study.noise import UNSEEN
+from ..study.residual import rms, stated_noise
+from ..study.study import Study, look
+from . import numerics
 from .case import Case, End
+from .leftover import CHANCE, chi2, rows
 from .values import entry
 from .written import heading, write_extended
 

@@ -16,14 +16,14 @@ from penode_gen import units
 from ...errors import UserError
 from ...predicted import Options, Predicted, both, known, read
 from ...replay import Replay
-from ..beginning import begins_at_rest
-from ..fit import Free, Problem
-from ..measuring import achieved
-from ..noise import UNSEEN, Experiment, metric
-from ..residual import Channel, channels, noise_floor, noise_rms, rms, stated_noise
-from ..restoring import Surface, surfaces
+from ..extend.beginning import begins_at_rest
+from ..extend.measuring import achieved
 from ..result import Diagnosis, Figure, Gain
-from ..study import Study, fitted, uncertain
+from ..study.fit import Free, Problem
+from ..study.noise import UNSEEN, Experiment, metric
+from ..study.residual import Channel, channels, noise_floor, noise_rms, rms, stated_noise
+from ..study.restoring import Surface, surfaces
+from ..study.study import Study, fitted, uncertain
 from .case import Case, End
 
 Array = NDArray[np.float64]

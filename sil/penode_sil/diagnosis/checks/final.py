@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ...compared import REJECTED
-from .. import residual
-from ..missing import missing_forces
 from ..result import Diagnosis
+from ..study import residual
+from ..study.missing import missing_forces
 from .case import Case, End
 from .channels import Mix, with_mixes
 from .figures import tabled, with_figures

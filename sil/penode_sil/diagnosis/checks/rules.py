@@ -18,10 +18,10 @@ from .. import catalogue
 from ..catalogue import drives, values as of_values
 from ..catalogue.friction import turns
 from ..evidence.bench import with_tolerances
-from ..noise import UNSEEN
 from ..report.figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, UNKNOWN, Cause, place
-from ..worth import RATIO
+from ..search.worth import RATIO
+from ..study.noise import UNSEEN
 from . import values
 from .case import Case, End
 from .figures import ROLES, Row, Table, misses, tabled

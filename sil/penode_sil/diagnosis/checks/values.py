@@ -19,14 +19,14 @@ from penode_gen.model import Model, Parameter
 
 from ...compared import worsened
 from ..catalogue import values as of_values
-from ..entries import table
-from ..fit import Fit, Free, Problem
-from ..leftover import CHANCE, only_noise, rows
+from ..extend.entries import table
 from ..result import Cause, Value
-from ..study import uncertain
-from ..worth import RIGHT, Z_95
+from ..search.worth import RIGHT, Z_95
+from ..study.fit import Fit, Free, Problem
+from ..study.study import uncertain
 from .case import Case, End
 from .figures import Table
+from .leftover import CHANCE, only_noise, rows
 from .written import heading
 
 

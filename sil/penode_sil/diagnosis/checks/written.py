@@ -10,7 +10,7 @@ from pathlib import Path
 import penode_gen
 from penode_gen.model import Model
 
-from ..entries import extends, toml
+from ..extend.entries import extends, toml
 from ..result import EXTENDED
 from .case import Case
 

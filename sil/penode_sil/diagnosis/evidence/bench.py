@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model, Parameter
 
-from ..fit import Free
-from ..plant import Place
+from ..plant.plant import Place
+from ..study.fit import Free
 from .colour import Colour, is_white
 from .fit import Fit, Problem, likelihood
 from .gain import Gains, Level, driven_by_noise, linear

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, linalg
 
-from ..noise import Experiment
+from ..study.noise import Experiment
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fit import Free
+from ..study.fit import Free
 from .colour import Colour
 from .observer import Filter, Predictor
 from .prior import cost, precisions, slopes as prior_slopes

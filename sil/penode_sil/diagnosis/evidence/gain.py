@@ -15,7 +15,7 @@ from scipy import linalg
 
 from penode_gen.model import Model
 
-from ..plant import Linear, linearise
+from ..plant.plant import Linear, linearise
 from .observer import UNMODELLED, Filter
 
 Array = NDArray[np.float64]

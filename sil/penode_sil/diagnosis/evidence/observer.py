@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter, Signal, State
 
 from ...batch import Batch, Observer
-from ..between import far, finer, joined, straight
 from ..catalogue.actuators import ACTUATORS
-from ..compiling import compiled, ordered
-from ..fit import Free
-from ..noise import Experiment
-from ..plant import Place, anonymous, extend, external, rotational_unit
+from ..plant.between import far, finer, joined, straight
+from ..plant.compiling import compiled, ordered
+from ..plant.plant import Place, anonymous, extend, external, rotational_unit
+from ..study.fit import Free
+from ..study.noise import Experiment
 from . import latency, samples
 
 Array = NDArray[np.float64]

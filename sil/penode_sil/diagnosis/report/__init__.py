@@ -27,8 +27,8 @@ from ...output import whole
 from .. import catalogue
 from ..advice import doubts
 from ..reliability import line
-from ..residual import Channel, Shown
 from ..result import VERDICTS, Diagnosis, place, plain
+from ..study.residual import Channel, Shown
 from . import figure as fig
 from .changes import difference, price
 from .figure import pretty

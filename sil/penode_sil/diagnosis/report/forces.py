@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..restoring import LEAST, Surface, averages, cells, rms
+from ..study.restoring import LEAST, Surface, averages, cells, rms
 from . import figure as fig
 from .figure import Axis, Figure, pretty, readable
 from .words import percent, value

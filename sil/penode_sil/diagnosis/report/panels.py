@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..residual import Channel, Residual, linear_share
+from ..study.residual import Channel, Residual, linear_share
 from . import figure as fig
 from .figure import Axis, Figure, pretty, readable, time_unit
 from .words import bursts, common, half_between, percent, value, where

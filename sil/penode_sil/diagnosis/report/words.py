@@ -11,8 +11,8 @@ import numpy as np
 
 from .. import catalogue
 from ..advice import doubts
-from ..residual import Channel
 from ..result import OUTSIDE, Cause, Diagnosis, place, plain, sigmas
+from ..study.residual import Channel
 from . import figure as fig
 from .figure import pretty, readable, time_unit
 

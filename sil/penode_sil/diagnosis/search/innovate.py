@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The search by innovations for missing effects of a model: the forms accepted, and those large enough to be named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..evidence.bench import Bench
+from ..evidence.blocks import BLOCKS, Blocks
+from ..evidence.fit import Fit
+from ..evidence.observer import Filter, bias
+from .propose import FREE_RUN
+from .reconsider import centred, reconsidered
+from .rounds import LEVEL_FACTORS, MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, is_large, name_of, terms_of
+from .terms import Term, Trial
+from .worth import RATIO, Z_95, least, mostly, remaining
+
+FINEST = 1e-3  # of a signal: no channel is calibrated better
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search has found: its `rounds` and their `end`; `plain`, a bench with only the forms worth naming (`named`, with their terms
+    there); `small`, the other forms; the free `run` that fits best, with those sensor offsets that are surely none of noise; and the
+    unmodelled `level` that remains, see `remaining`."""
+
+    rounds: Rounds
+    end: Grown
+    plain: Bench
+    named: tuple[Accepted, ...]
+    small: tuple[Accepted, ...]
+    run: Fit
+    level: float
+
+    @property
+    def bench(self) -> Bench:
+        """With all accepted forms."""
+        return self.end.bench
+
+    @property
+    def possible(self) -> float:
+        """The level that may remain where a free run shows none, for what no innovations alone require: parameters, offsets."""
+        return max(self.level, self.bench.level.size)
+
+    @property
+    def terms(self) -> list[Term]:
+        """All terms in it."""
+        return terms_of(self.end.accepted)
+
+    def naming(self, more: Sequence[Accepted]) -> Found:
+        """The same with some of the small forms named too."""
+        numbers = {a.number for a in (*self.named, *more)}
+        return _found(self.rounds, self.end, [a.number in numbers for a in self.end.accepted], self.run, self.level)
+
+
+def search(bench: Bench, log: Callable[[str], None]) -> Found:
+    """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own.
+    Where none is large, it looks again with an observer that corrects less: one that follows all that moves hides what happens seldom."""
+    rounds = Rounds(bench, Blocks.of([len(r) // bench.update for r in bench.records]), log)
+    end = reconsidered(rounds, rounds.grow())
+    if not any(end.large) and bench.level.size > 0.0:
+        stiffer = replace(rounds, stiffer=LEVEL_FACTORS[1])
+        again = reconsidered(stiffer, stiffer.grow())
+        rounds, end = (stiffer, again) if any(again.large) else (rounds, end)
+    end = centred(rounds, end)
+    after, sensors = end.bench, [bias(s.name) for s in bench.model.sensors]
+    none = [b for b in sensors if abs(after.fit.value(b)) <= Z_95 * after.fit.deviation(b)]
+    run = after.problem().solve([f for f in after.fit.free if f.target not in none], Filter.none(*after.fit.by.gain.shape), 2 * FREE_RUN)
+    level = remaining(after, run, np.array([s.noise for s in bench.model.sensors]))
+    log(f"what remains: {level:.3g} of all forces")
+    end = _run_free(end, level, log)
+    return _found(rounds, end, _own_names(end), run, level)
+
+
+def _own_names(end: Grown) -> list[bool]:
+    """Which forms have a name: the large ones, but for one that gains less than MIN_FORM of what another does at its place, input or
+    sensor: the curve of that is not its textbook form, and the small one makes up for the difference."""
+    large = [a.trial for a, big in zip(end.accepted, end.large, strict=True) if big]
+    most = {t.form.at: max(o.gain for o in large if o.form.at == t.form.at) for t in large}
+    return [big and a.trial.gain >= MIN_FORM * most[a.trial.form.at] for a, big in zip(end.accepted, end.large, strict=True)]
+
+
+def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
+    """The end of a search, with those forms large that have a name beside the unmodelled `level` that remains. One too small for that
+    counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it."""
+    bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
+    accepted, most = list(end.accepted), max((a.trial.gain for a in end.accepted), default=0.0)
+    large = [
+        _is_required(a.trial, level, end.bench.level.size, most) or is_large(a.trial, _worth(a.trial, level, a.trial.whole))
+        for a in accepted
+    ]
+    if all(large):
+        return replace(end, large=tuple(large))
+    problem = bench.problem()
+    whole = problem.solve(bench.fit.free, still, FREE_RUN)
+    for k, a in enumerate(end.accepted):
+        if large[k]:
+            continue
+        own = {f.target for t in a.terms for f in t.free}
+        starts = [[f for f in fit.free if f.target not in own] for fit in (bench.fit, whole)]
+        without = max((problem.solve(free, still, FREE_RUN) for free in starts), key=lambda f: f.cost)
+        taken = without.taken_whole(whole, problem.floor)
+        log(f"{name_of(a.trial)} explains {taken:.1%} of the error of a free run without it")
+        if mostly(taken):
+            accepted[k] = replace(a, trial=replace(a.trial, whole=max(taken, a.trial.whole)))
+            large[k] = a.trial.share >= _worth(a.trial, level, taken)
+    return replace(end, accepted=tuple(accepted), large=tuple(large))
+
+
+def _is_required(t: Trial, level: float, followed: float, most: float) -> bool:
+    """Is it one beside which next to nothing remains, by the `level` of a free run and, but where every block demands it on average by
+    MIN_GAIN, by that which the observer has `followed`? Held-out blocks have accepted it; but where another form gained the `most`, a curve
+    that is off by MIN_FORM from what is there leaves the square of that for others to make up for."""
+    remains = level if t.gain > BLOCKS * MIN_GAIN else max(level, followed)
+    share, gain = max(RATIO * remains, _finest(t)), MIN_FORM**2 * most
+    return t.share >= share and t.gain >= gain
+
+
+def _worth(t: Trial, level: float, taken: float) -> float:
+    """The share from which on a form has a name, see `least`."""
+    return max(least(level, taken), _finest(t))
+
+
+def _finest(t: Trial) -> float:
+    """The least share of a form of an input or a sensor."""
+    return FINEST * (t.form.how != "force")
+
+
+def _found(rounds: Rounds, end: Grown, worth_naming: Sequence[bool], run: Fit, level: float) -> Found:
+    named = [a for a, worth in zip(end.accepted, worth_naming, strict=True) if worth]
+    small = tuple(a for a, worth in zip(end.accepted, worth_naming, strict=True) if not worth)
+    plain, _, named = rounds.beside(named) if small else (end.bench, end.scores, named)
+    return Found(rounds, end, plain, tuple(named), small, run, level)

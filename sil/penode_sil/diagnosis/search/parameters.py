@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Parameters that differ from the model file in a fit to innovations: which are causes, and which only compensate for laws that are
+missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from penode_gen import units
+from penode_gen.model import Model, Parameter
+
+from .. import catalogue
+from ..catalogue import values as of_values
+from ..catalogue.form import Motion
+from ..evidence.bench import UNSTATED
+from ..evidence.fit import Fit
+from ..result import Cause, Value
+from ..study.study import guessed
+from . import straight
+from .innovate import Found
+from .rounds import terms_of
+from .terms import Term
+from .worth import Z_95, least, shift, systematic, undetermined
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What the parameters of a fit amount to: `causes`, those that are wrong; `notes` on others that are off; and names of the `absorbed`,
+    which are off beside the named forms alone, but within their limits once the small forms are in the model too."""
+
+    causes: tuple[Cause, ...]
+    notes: tuple[str, ...]
+    absorbed: tuple[str, ...]
+
+
+def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float, log: Callable[[str], None]) -> Judged:
+    """Judges each parameter by its value beside the named forms alone, in a bench that has moved along `moved`, and by its value beside all
+    forms that were found. Causes have this `confidence`."""
+    plain, whole = found.plain.fit, found.bench.fit.values
+    shared = straight.beside(model, found.plain, _straight(terms_of(found.named)), moved)
+    shared_by_all = straight.beside(model, found.bench, _straight(found.terms), moved)
+    causes, notes, absorbed = [], [], []
+    for p in model.parameters.values():
+        if p.name not in whole or np.isinf(p.tolerance):
+            continue
+        size, value, beside, unit = shift(model, found.plain, moved, p.name), plain.value(p.name), whole[p.name], units.si(p.unit)
+        bent = systematic(found.possible)
+        sd = float(np.hypot(plain.deviation(p.name), bent / max(size, bent, 1e-300) * abs(value - p.value)))
+        log(f"{p.name}: {value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of the force there")
+        if abs(value - p.value) <= _limit(p) * abs(p.value) + Z_95 * sd:
+            continue
+        if p.name in shared and not straight.off(p.value, value, shared[p.name], _limit(p)):
+            notes.append(f"{p.name} is {value:.4g} {unit} together with the cause found at its place, which has a linear part too")
+        elif size < least(found.possible, 0.0):
+            notes.append(
+                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than unmodelled effects can"
+            )
+        elif not straight.off(p.value, beside, shared_by_all.get(p.name, (0.0, 0.0)), _limit(p)):
+            absorbed.append(p.name)
+            notes.append(
+                f"{p.name} is {value:.4g} {unit} without the small deviations that were found, "
+                f"and {beside:.4g} with them: within its tolerance"
+            )
+        else:
+            causes.append(_cause(p, value, sd, shared, confidence))
+    return Judged(tuple(causes), tuple(notes), tuple(absorbed))
+
+
+def _straight(terms: Sequence[Term]) -> list[Term]:
+    """Those with a straight part, which a place shares with its linear element."""
+    return [t for t in terms if t.form.how == "force" and t.form.kind in getattr(catalogue.OF[t.form.kind], "STRAIGHT", ())]
+
+
+def notes_on_guessed(model: Model, fit: Fit) -> list[str]:
+    """Notes, one or none, on parameters that the file only guesses, at their fitted values."""
+    found, ratios = [], undetermined(model, fit)
+    for name in guessed(model):
+        if name in fit.values:
+            sure = "" if name in ratios else f" +- {Z_95 * fit.deviation(name, ratios):.2g}"
+            found.append(f"{name} = {fit.value(name):.4g} {units.si(model.parameters[name].unit)}{sure}")
+    only = f"; the recordings show forces as ratios to {', '.join(sorted(ratios))} only" if ratios else ""
+    return [f"fitted, because the file gives only a guess: {', '.join(found)}{only}"] if found else []
+
+
+def _limit(p: Parameter) -> float:
+    """Largest relative deviation that is no cause: the tolerance, or UNSTATED if the file states none."""
+    return p.tolerance if p.tolerance > 0.0 else UNSTATED
+
+
+def _cause(p: Parameter, value: float, sd: float, shared: Mapping[str, straight.Slopes], confidence: float) -> Cause:
+    """The parameter as a cause, with the slopes that laws at its place share with it."""
+    least, most = shared.get(p.name, (0.0, 0.0))
+    size = Value(value + 0.5 * (least + most), units.si(p.unit), (value - Z_95 * sd + least, value + Z_95 * sd + most))
+    return of_values.cause(p.name, size, confidence)

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""A second look at early choices: once later causes are known, each is kept, dropped, or exchanged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from .. import catalogue
+from ..catalogue import others
+from ..catalogue.form import Form
+from ..evidence.observer import bias
+from ..evidence.screening import Probe
+from .propose import as_it_is, is_part, motions
+from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, name_of, of_curve, scored, simplest, terms_of
+from .terms import Trial
+from .worth import Z_95, mostly, wrong
+
+
+def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
+    """Returns the end of a search, or a better one (floating search; Pudil, Novovicova and Kittler 1994). For each form of two laws, such
+    as a friction with a constant, it also tries the best single law instead, and searches on from there."""
+    best = _exchanged(rounds, grown)
+    for k, a in enumerate(best.accepted):
+        single = [t for t in a.trials if len(t.form.kinds) == 1]
+        if len(a.trial.form.kinds) > 1 and single:
+            first = Accepted(max(single, key=_score), a.number, (), a.trials)
+            other = _exchanged(rounds, rounds.grow([*best.accepted[:k], first]))
+            more = max(len(terms_of(other.accepted)) - len(terms_of(best.accepted)), 0)
+            gain = _total(other) - _total(best)
+            rounds.log(f"replacing the two-law form {name_of(a.trial)} by {[name_of(x.trial) for x in other.accepted]}: {gain:.0f} nats")
+            if gain > MIN_GAIN * (1 + more):
+                return other
+    return best
+
+
+def centred(rounds: Rounds, grown: Grown) -> Grown:
+    """Exchanges a form that needs offsets of sensors for one with its middle elsewhere, if that predicts as well without any offset: where
+    a curve has its middle, and where a sensor has its zero, is the same, and this is one cause instead of two."""
+    fit = grown.bench.fit
+    biases = [f for b in (bias(s.name) for s in rounds.start.model.sensors) for f in fit.free if f.target == b]
+    if all(abs(f.value) <= Z_95 * fit.deviation(f.target) for f in biases):
+        return grown
+    none, sensors = {f.target for f in biases}, [s.name for s in rounds.start.model.sensors]
+    off = tuple((others.OFFSET, s) for s, f in zip(sensors, biases, strict=True) if abs(f.value) > Z_95 * fit.deviation(f.target))
+    for k, a in enumerate(grown.accepted):
+        values = {f.target: f.value for f in fit.free}
+        form = catalogue.aside(_fitted_shapes(a, values))
+        if form is None:
+            continue
+        form = replace(form, alike=off)
+        bench, _, within = rounds.beside([x for x in grown.accepted if x is not a])
+        plain = replace(bench, fit=bench.problem().at([f for f in bench.fit.free if f.target not in none], bench.fit.by))
+        t = as_it_is(plain, bench.fit, form, motions(Probe.of(bench)), terms_of(within))
+        t = scored(plain, bench.problem(t.model), rounds.blocks, t)
+        rounds.log(f"{form.kind} at {form.where} {form.note}: {_score(t) - _total(grown):.1f} nats more, without offsets")
+        if _score(t) >= _total(grown) - MIN_GAIN:
+            free = (*t.fit.free, *(replace(f, value=f.origin) for f in biases))
+            other = Accepted(replace(t, fit=replace(t.fit, free=free)), a.number, (), (t, *a.trials))
+            end = rounds.grow([*grown.accepted[:k], other, *grown.accepted[k + 1 :]])
+            if _total(end) >= _total(grown) - MIN_GAIN:
+                return end
+    return grown
+
+
+def _fitted_shapes(a: Accepted, values: Mapping[object, float]) -> Form:
+    """An accepted form with its shapes as they are fitted."""
+    parts = [part for term in a.terms for _, part in term.laws(values)]
+    return replace(a.trial.form, parts=tuple(parts))
+
+
+def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
+    """Drops each doubtful form that the others make unnecessary, or exchanges it for one that is simpler or predicts better beside them;
+    then resumes the search, and keeps the new end if that loses no more than what was dropped or simplified may. Doubtful are large forms
+    other than the last: all of them if a trial that was not accepted would take most of what is still missed, else those preferred to a
+    simpler form of the same curve, or of a curve of which a place has one. After an exchange the last form is checked too."""
+    found, whole, loss = list(grown.accepted), _total(grown), 0.0
+    missed = any(mostly(t.whole) for t in grown.rest)
+    doubted = [a for a, big in zip(found[:-1], grown.large[:-1], strict=True) if big and (missed or _has_other(a))]
+    last = found[-1:] if found and grown.large[-1] else []
+    while doubted:
+        a = doubted.pop(0)
+        others = [x for x in found if x is not a and not _makes_up(x.trial, a.trial)]
+        bench, scores, within = rounds.beside(others)
+        if whole - float(np.sum(scores)) <= MIN_GAIN:
+            rounds.log(f"{name_of(a.trial)} is not needed")
+            found, whole, loss = others, float(np.sum(scores)), loss + MIN_GAIN
+            continue
+        good = rounds.good(bench, scores, within)
+        own = max((_score(t) for t in good if name_of(t) == name_of(a.trial)), default=whole)
+        best = simplest(good, scores, terms_of(within)) if good else a.trial
+        share = wrong(bench.level.size) if is_part(best.form, a.trial.form) else 1.0
+        less = max(MIN_GAIN, share * MIN_FORM * (own - float(np.sum(scores))))
+        simpler = len(best.term.free) < len(a.trial.term.free) and _score(best) >= own - less
+        if name_of(best) != name_of(a.trial) and (simpler or _score(best) - own > MIN_GAIN):
+            rounds.log(f"{name_of(best)} for {name_of(a.trial)}")
+            number = 1 + max(x.number for x in found)  # a fresh one: fits of other forms still hold parameters named after the old one
+            found[found.index(a)] = Accepted(best, number, (), good)
+            whole, loss = float(np.sum(rounds.beside(found)[1])), loss + less * simpler
+            doubted, last = [*doubted, *last], []
+        elif any(name_of(t) == name_of(a.trial) for t in good):
+            found[found.index(a)] = replace(a, trials=good)  # its rivals are those beside all others
+    if [a.number for a in found] == [a.number for a in grown.accepted]:
+        return replace(grown, accepted=tuple(found))
+    end = rounds.grow(found)
+    return end if _total(end) >= _total(grown) - loss else grown
+
+
+def _makes_up(t: Trial, other: Trial) -> bool:
+    """Does a form gain less than MIN_FORM of what another does at its place: is the curve of that not quite what is there?"""
+    return t.form.at == other.form.at and t.gain < MIN_FORM * other.gain
+
+
+def _has_other(a: Accepted) -> bool:
+    """Was a form preferred to one of another name, of the same curve, with fewer values; or is it of a curve of which a place has one, so
+    that no other form of that was tried beside what came later?"""
+    others = [t for t in a.trials if of_curve(t) == of_curve(a.trial) and name_of(t) != name_of(a.trial)]
+    return any(len(t.term.free) < len(a.trial.term.free) for t in others) or catalogue.has_one_curve(a.trial.form.kind)
+
+
+def _score(t: Trial) -> float:
+    return float(np.sum(t.blocks))
+
+
+def _total(grown: Grown) -> float:
+    return float(np.sum(grown.scores))

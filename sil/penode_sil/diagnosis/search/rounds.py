@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""Rounds of the search: propose by a score test, fit to innovations, compare on held-out blocks, accept the best, until none is good."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..catalogue import curve
+from ..evidence.bench import SIZES, Bench, fit_level
+from ..evidence.blocks import BLOCKS, Blocks
+from ..evidence.fit import Fit, Problem
+from ..evidence.gain import Level
+from ..evidence.prior import stated
+from ..evidence.screening import Probe
+from ..extend import late
+from . import clipping, holding
+from .adopting import adopt
+from .propose import FOLLOWED, PROMISE, is_part, motions, propose
+from .terms import Term, Trial
+from .worth import WORTH, Z_95, alone, least, mostly, share, undetermined, wrong
+
+Array = NDArray[np.float64]
+SCORED = 4  # of the promising trials, how many are scored on held-out blocks, beside the one with the best free run
+MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better, at least
+MIN_FORM = (
+    0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
+)
+# of the power of a sensor's innovations: what is three times the mis-modelling at its place takes 0.9 there, and a vehicle has three
+MIN_TAKEN = 0.25
+MIN_BLOCKS = BLOCKS - 1  # in which it does
+LEVEL_FACTORS = (3.0, 10.0, 30.0)  # times a level: those that are tried
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """An accepted form: its `trial`; the `number` in its parameter names; its `terms` in the bench, one for each kind of law; and the
+    `trials` it was compared with, best first."""
+
+    trial: Trial
+    number: int
+    terms: tuple[Term, ...]
+    trials: tuple[Trial, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """The state of a search: the bench with all accepted forms, its `scores` [blocks] on held-out blocks, which forms are `large`, and
+    `rest`, the good trials not accepted."""
+
+    bench: Bench
+    scores: Array
+    accepted: tuple[Accepted, ...]
+    large: tuple[bool, ...]
+    rest: tuple[Trial, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Rounds:
+    """Rounds of a search that starts from a bench without any cause. Causes are proposed by an observer for `stiffer` times less unmodelled
+    force than there is."""
+
+    start: Bench
+    blocks: Blocks
+    log: Callable[[str], None]
+    stiffer: float = 1.0
+
+    def grow(self, accepted: Sequence[Accepted] = ()) -> Grown:
+        """Accepts causes beside those accepted already, one at a time, the best predictor first, until none predicts enough better, or the
+        best is too small for a name and cannot hide a larger one. The search goes on after a small form that takes most of the misfit, or
+        that every block demands (`_is_sure`), or, while none is large, enough that little may remain: one more cause may explain the rest.
+        If it does, all forms are judged again by the smaller level that remains."""
+        bench, scores, found = self.beside(accepted)
+        good = self.good(bench, scores, found)
+        if not good and not found and bench.level.size >= WORTH:
+            bench, scores, found = self.beside(self.pair(bench, scores))
+            good = self.good(bench, scores, found) if found else ()
+        large = [is_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
+        hides = not found or large[-1] or any(_hidden(t, found[-1].trial) for t in found[-1].trials)
+        while good:
+            best = simplest(good, scores, terms_of(found))
+            sure = _is_sure(bench, best, scores, found)
+            if not hides and not sure and not _matters(best) and not _may_remain(bench, large, best):
+                break
+            number = 1 + max((a.number for a in found), default=-1)
+            bench, terms = adopt(bench, best, number)
+            bench, scores = _based(bench, self.blocks)
+            rivals = tuple(replace(t, blocks=scores) if t is best else t for t in good)  # with edges as steep as they are now
+            found.append(Accepted(best, number, tuple(terms), rivals))
+            large.append(is_large(best, least(bench.level.size, best.whole)))
+            hides = large[-1] or any(_hidden(t, best) for t in good)
+            if not hides and not sure and not mostly(best.whole) and not _may_remain(bench, large, best):
+                good = ()
+                break
+            good = self.good(bench, scores, found)
+        if found and (alone(found[-1].trial.whole) or least(bench.level.size, 0.0) < WORTH):
+            large = [is_large(a.trial, least(bench.level.size, a.trial.whole)) for a in found]
+        return Grown(bench, scores, tuple(found), tuple(large), good)
+
+    def pair(self, bench: Bench, scores: Array) -> list[Accepted]:
+        """Two causes that together predict left-out blocks better than `scores`, where no cause does alone: the delay and the friction of a
+        drive that starts from rest. Empty without any."""
+        best, total = [], float(np.sum(scores)) + 2.0 * MIN_GAIN
+        trials, wide = propose(bench, (), self.log, self.stiffer)
+        for t in (scored(bench, bench.problem(x.model or wide), self.blocks, x) for x in trials[:SCORED]):
+            beside, terms = adopt(bench, t, 0)
+            beside, level = _based(beside, self.blocks)
+            first = Accepted(t, 0, tuple(terms), (t,))
+            if good := self.good(beside, level, [first]):
+                second = simplest(good, level, terms)
+                if np.sum(second.blocks > scores) >= MIN_BLOCKS and np.sum(second.blocks) > total:
+                    best, total = [first, Accepted(second, 1, (), good)], float(np.sum(second.blocks))
+        self.log(f"a pair: {[name_of(a.trial) for a in best]}")
+        return best
+
+    def beside(self, accepted: Sequence[Accepted]) -> tuple[Bench, Array, list[Accepted]]:
+        """Rebuilds the bench with these forms; returns it, its scores, and the forms with the share of their name in it. What a form took
+        of the misfit stays that of its round."""
+        bench, found = self.start, []
+        for a in accepted:
+            bench, terms = adopt(bench, a.trial, a.number)
+            found.append(replace(a, terms=tuple(terms)))
+        moved = motions(Probe.of(bench)) if found else []
+        same = [[x for o in found if name_of(o.trial) == name_of(a.trial) for x in o.terms] for a in found]
+        shares = [share(bench, terms, bench.fit, moved) for terms in same]
+        found = [replace(a, trial=replace(a.trial, share=x)) for a, x in zip(found, shares, strict=True)]
+        return *_based(bench, self.blocks), found
+
+    def good(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> tuple[Trial, ...]:
+        """Trials that predict left-out blocks better than `scores` by MIN_GAIN, the best first. If a large form predicts as well as the
+        best, to MIN_GAIN, only large ones; otherwise the large form only imitates a smaller one."""
+        trials, wide = propose(bench, terms_of(accepted), self.log, self.stiffer)
+        trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
+        freest = sorted(trials, key=lambda t: -t.run)[:1]
+        trials = [t for t in trials if t in trials[:SCORED] or t in freest]
+        trials = holding.told_apart(bench, wide, [scored(bench, bench.problem(t.model or wide), self.blocks, t) for t in trials])
+        better = [t.blocks - scores for t in trials]
+        for t, b in zip(trials, better, strict=True):
+            self.log(
+                f"{t.form.kind} at {t.form.where} {t.form.note}: {t.gain:.1f} nats, {t.share:.1%}, "
+                f"{t.taken:.1%} of the power, blocks {np.round(b, 1)}"
+            )
+        good = [t for t, b in zip(trials, better, strict=True) if _accepted(bench, t, b)]
+        good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
+        matter = [t for t in good if _matters(t)]
+        if matter and max(np.sum(t.blocks) for t in good) - max(np.sum(t.blocks) for t in matter) <= MIN_GAIN:
+            good = matter
+        return tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks))))
+
+
+def terms_of(accepted: Sequence[Accepted]) -> list[Term]:
+    """All terms of accepted forms."""
+    return [x for a in accepted for x in a.terms]
+
+
+def _hidden(t: Trial, small: Trial) -> bool:
+    """May a form at another place prove large once a small one is in the model? Its force is large enough; its share of the innovations
+    rises when the small one is gone."""
+    return t.form.at != small.form.at and t.share >= WORTH
+
+
+def _may_remain(bench: Bench, large: Sequence[bool], best: Trial) -> bool:
+    """May small forms together leave so little that they have names? Where none is large, the last has taken its share of a sensor's
+    innovations, and the unmodelled force is small already."""
+    return not any(large) and best.taken >= MIN_TAKEN and least(bench.level.size, 0.0) < WORTH
+
+
+def _is_sure(bench: Bench, best: Trial, scores: Array, found: Sequence[Accepted]) -> bool:
+    """Does every block demand a form by MIN_GAIN, where little is unmodelled, and more of it than the curve of another one may be off?"""
+    demanded = bool(np.all(best.blocks - scores > MIN_GAIN)) and least(bench.level.size, 0.0) < WORTH
+    return demanded and all(best.gain >= MIN_FORM * a.trial.gain for a in found)
+
+
+def _matters(t: Trial) -> bool:
+    """Is a form large, or, as small as it is, nearly all that is missed?"""
+    return is_large(t, WORTH) or alone(t.whole)
+
+
+def is_large(t: Trial, least_share: float) -> bool:
+    """Is a form more than one of many small deviations? A large force that changes little stands for what others do as well."""
+    return t.share >= least_share and t.taken >= MIN_TAKEN
+
+
+def levels(level: Level) -> list[float]:
+    """Larger sizes of the unmodelled force that are tried, up to all forces: beyond that an observer follows any motion."""
+    return [size for factor in LEVEL_FACTORS if (size := max(level.size, SIZES[1]) * factor) <= 1.0]
+
+
+def _based(bench: Bench, blocks: Blocks) -> tuple[Bench, Array]:
+    """The bench with the level that predicts best, and its scores [blocks], less what parameters cost that are not what the file states.
+    The likeliest comes first: a form that is new there lets it fall, which would count for the next form otherwise."""
+    problem = bench.problem()
+    level, fit = _converged(bench, problem)
+    level, fit, scores = blocks.fit_level(bench, problem, fit, level, levels(level))
+    return replace(bench, level=level, fit=fit), scores - stated(fit.free) / len(scores)
+
+
+def _converged(bench: Bench, problem: Problem) -> tuple[Level, Fit]:
+    """The likeliest level and fit from those of a bench on, as long as going on gains PROMISE: along a narrow valley, the iterations of any
+    trial are progress too."""
+    level, fit, gained = bench.level, bench.fit, np.inf
+    while gained > PROMISE:
+        before = fit.cost
+        level, fit = fit_level(bench, problem, problem.solve(fit.free, fit.by, FOLLOWED), level)
+        gained = fit.cost - before
+    return level, fit
+
+
+def scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
+    """A trial with its scores, as those of a bench."""
+    own = [] if t.level == bench.level else [bench.level.size]
+    level, fit, scores = blocks.fit_level(replace(bench, model=problem.predictor.model), problem, t.fit, t.level, own)
+    return replace(t, level=level, fit=fit, blocks=scores - stated(fit.free) / len(scores))
+
+
+def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Trial:
+    """Of the curve that predicts best, the form with the fewest values; one with more where it predicts every block better, and all of
+    them by `margin`. Curves that predict equally well, to MIN_GAIN, also rank by their values; to more, where one has half of
+    them (`_simplicity`). A new name has to gain as much more than another law of a name already accepted as a form has."""
+    named, most = {name_of(t) for t in terms}, trials[0]
+    alike = [t for t in trials if np.sum(most.blocks - t.blocks) <= margin(t, base, _simplicity(t, most))]
+    first = min(alike, key=lambda t: (len(t.term.free), -np.sum(t.blocks)))
+    best = next((t for t in trials if name_of(t) in named and np.sum(most.blocks - t.blocks) <= margin(most, base)), first)
+    same = [t for t in trials if of_curve(t) == of_curve(best)]
+    found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
+    for t in more:
+        better, same_name = t.blocks - found.blocks, name_of(t) == name_of(found)
+        nested = same_name or is_part(found.form, t.form)
+        share = max(wrong(t.level.size), 0.0 if same_name else MIN_FORM) if nested else 1.0
+        if np.all(better > 0.0) and np.sum(better) > margin(found, base, share):
+            found = t
+    return found
+
+
+def _simplicity(t: Trial, other: Trial) -> float:
+    """Share of MIN_FORM by which a form may gain less than another of more values: MIN_FORM where it has half of them, all where it has
+    less. A mass on a spring and a damper may stand for many a law with one value, a spring and a damper for a delay."""
+    few, many = len(t.term.free), len(other.term.free)
+    return float(2 * few < many) or MIN_FORM * (2 * few <= many)
+
+
+def margin(t: Trial, base: Array, share: float = 1.0) -> float:
+    """What another form has to gain beyond a trial if it has more values, or another name: a `share` of MIN_FORM of its gain. One that has
+    all laws of the trial, and more, or the same name, has to gain less where the world is less wrong: waves in other curves look like more
+    laws."""
+    return max(MIN_GAIN, share * MIN_FORM * float(np.sum(t.blocks - base)))
+
+
+def _is_enough(part: Trial, t: Trial) -> bool:
+    """Does a form with some of the laws of another one, a constant beside a friction, predict about as well alone?"""
+    return is_part(part.form, t.form) and float(np.sum(t.blocks) - np.sum(part.blocks)) <= MIN_GAIN
+
+
+def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
+    """Is a form enough better, with a size that is not zero, nor a delay too short to be one, nor a limit that samples are beyond?"""
+    if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN):
+        return False
+    if t.form.how in late.HOW and t.fit.value(t.term.free[0].target) < late.SHORT * bench.step:
+        return False
+    if t.form.how == "clip" and not clipping.is_possible(bench, t.form, t.fit.value(t.term.free[0].target)):
+        return False
+    known = undetermined(bench.model, t.fit)
+    return all(abs(t.fit.value(f.target) - f.origin) > Z_95 * t.fit.deviation(f.target, known) for f in t.term.free if not f.log)
+
+
+def of_curve(t: Trial) -> tuple[object, int | str]:
+    return curve(t.form.kind), t.form.at
+
+
+def name_of(t: Term | Trial) -> tuple[str, str]:
+    return t.form.kind, t.form.where

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""The straight line that laws found at a place share with its linear element: what of it is a parameter that is off.
+
+How much of a line is whose, of two elements in parallel, is a matter of writing it down: an asymmetric spring beside a stiffness k may be
+that of either side, or of their mean. So a parameter is compared with all slopes that its element and the laws beside it have together: it
+is off where none of these is within its tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from penode_gen import laws
+from penode_gen.model import Model
+
+from ..catalogue.form import Motion, Moved
+from ..evidence.bench import Bench
+from ..plant.plant import Place
+from .terms import Term
+from .worth import LINEAR
+
+Array = NDArray[np.float64]
+Slopes = tuple[float, float]  # the least and the greatest
+
+
+def off(nominal: float, own: float, slopes: Slopes, limit: float) -> bool:
+    """Is a parameter, `own` as it is fitted, farther from its nominal value than its relative `limit`, with any of the slopes beside it?"""
+    far = limit * abs(nominal)
+    return not own + slopes[0] - far <= nominal <= own + slopes[1] + far
+
+
+def beside(model: Model, bench: Bench, terms: Sequence[Term], moved: Sequence[Motion]) -> dict[str, Slopes]:
+    """For each parameter of a linear law beside `terms` at its place: the fitted slopes of these terms."""
+    found: dict[str, Slopes] = {}
+    for k in {t.form.index for t in terms}:
+        own, motion = [t for t in terms if t.form.index == k], moved[k]
+        for parameter, quantity in _lines(model, bench.places[k]):
+            reach = motion.s_reach if quantity == "s" else motion.v_reach
+            found[parameter] = _slopes(own, bench, quantity, _grid(reach))
+    return found
+
+
+def _grid(reach: float) -> Array:
+    return np.linspace(-reach, reach, 401)
+
+
+def _lines(model: Model, place: Place) -> list[tuple[str, str]]:
+    """Parameters of the linear elements of a place, each with what it is the slope of."""
+    names = {n for n, _ in place.elements}
+    return [(p, LINEAR[e.law]) for e in model.elements if e.name in names and e.law in LINEAR for p in e.arguments.values()]
+
+
+def _slopes(terms: Sequence[Term], bench: Bench, quantity: str, x: Array) -> Slopes:
+    """Slopes of the laws of terms over deflection or rate. One with memory has any slope from 0 to its gain."""
+    zeros, force, low, high = np.zeros_like(x), np.zeros_like(x), 0.0, 0.0
+    along = Moved(x, zeros, np.arange(len(x)) * bench.step) if quantity == "s" else Moved(zeros, x, np.arange(len(x)) * bench.step)
+    for gain, part in (pair for term in terms for pair in term.laws(bench.fit.values)):
+        known = laws.LAWS.get(part.law)
+        if known and known.states:
+            low, high = low + min(gain, 0.0), high + max(gain, 0.0)
+        else:
+            force = force + gain * part.along(along)
+    least, most = _range(force, x)
+    return least + low, most + high
+
+
+def _range(force: Array, x: Array) -> Slopes:
+    slopes = np.gradient(force, x)
+    return float(np.min(slopes)), float(np.max(slopes))
