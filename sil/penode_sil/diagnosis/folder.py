@@ -27,6 +27,7 @@ import penode_gen
 
 from ..errors import TargetError, ToolMissing, UserError, WrongUse
 from ..guard import crash_file
+from ..recordings.measured import load
 from . import files, table
 from .files import Job
 from .table import Row
@@ -49,7 +50,7 @@ def diagnose(
     """
     parts = plan(job)
     model = files.load_model(job)
-    files.load(job.holdout, model, job.channels)
+    load(job.holdout, model, job.channels)
     sources = [_source(part, model) for part in parts]
     kept = {row.source: row for row in table.read(job.output)} if resume else {}
     rows = {k: kept[source] for k, source in enumerate(sources) if source in kept}
@@ -167,7 +168,7 @@ def _on_cluster(jobs: Sequence[Job], address: str) -> Iterator[tuple[int, Answer
 
     try:
         from distributed import Client, Security, wait
-        from distributed.comm import connect
+        from distributed.comm.core import connect
     except ImportError:
         raise ToolMissing(f"--scheduler {address}: Dask is not installed here; pip install penode[cluster]") from None
     for name in ("distributed", "distributed.client"):

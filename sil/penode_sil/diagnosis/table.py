@@ -86,7 +86,7 @@ def sentences(model: str, rows: Sequence[Row], folder: Path) -> str:
     for row in rows:
         head = (Path(row.recording).name, row.verdict.replace("_", " "))
         seconds = f"{row.diagnosis['seconds']:.0f} s" if row.diagnosis else ""
-        for k, cause in enumerate(row.causes or [None]):
+        for k, cause in enumerate(row.causes or (None,)):
             named = (cause["kind"], cause["where"], _parameters(cause)) if cause else ("", "", "")
             lines.append((*(head if k == 0 else ("", "")), *named, *((_gain(row), seconds) if k == 0 else ("", ""))))
     wide = [max(map(len, column)) for column in zip(*lines, strict=True)]
@@ -126,7 +126,7 @@ def _cells(rows: Sequence[Row]) -> Iterator[list[Any]]:
         gain = row.diagnosis["gain"] if row.diagnosis else {}
         tail = [gain[name][key] if name in gain else "" for name in signals for key in what]
         tail += [round(row.diagnosis["seconds"], 1) if row.diagnosis else "", row.error]
-        for c in row.causes or [None]:
+        for c in row.causes or (None,):
             named = [c["kind"], c["where"], round(c["confidence"], 3), _parameters(c)] if c else [""] * 4
             yield [row.recording, row.verdict, *named, *tail]
 

@@ -123,9 +123,7 @@ def _judged(study: Study, measured: Study, found: naming.Answer, after: Sequence
     """The judgement of a search that leads to a simulation `after`, beside `faults` of sensors."""
     model = study.model
     causes, notes = _plausible(model, found.causes)
-    known = replace(
-        found.run, free=tuple(f for f in found.run.free if f.target in guessed(model))
-    )  # the others may compensate for laws that were added
+    known = [f for f in found.run.free if f.target in guessed(model)]  # the others may compensate for laws that were added
     numbers, coarse = numerics.numerics(replace(measured, model=fitted(model, known)))
     share = max(_taken(study, after), found.taken, 0.0)  # the first without what sensors and inputs are off by
     ways = (after, study.null.simulated)  # the second with values within their tolerances, and weighed by noise of the inputs too

@@ -23,7 +23,8 @@ FARTHER = 0.02  # share of samples outside of the training, above which a hold-o
 def likely(d: Diagnosis) -> list[Mapping[str, Any]]:
     """The sets of causes that hold 95 % of the posterior together, the likeliest first: more than one, and the data do not say which."""
     sets = sorted(d.explanations, key=lambda x: -x["posterior"])
-    total, held, found = sum(x["posterior"] for x in sets), 0.0, []
+    found: list[Mapping[str, Any]] = []
+    total, held = sum(x["posterior"] for x in sets), 0.0
     for x in sets:
         if not found or held < 0.95 * total:
             found.append(x)

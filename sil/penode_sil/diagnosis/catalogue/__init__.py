@@ -55,7 +55,7 @@ def aside(form: Form) -> Form | None:
 
 def stem(kind: str) -> str:
     """What the elements of a kind are called in a model file."""
-    return getattr(OF.get(kind), "STEMS", {}).get(kind, kind)
+    return str(getattr(OF.get(kind), "STEMS", {}).get(kind, kind))
 
 
 def has_one_curve(kind: str) -> bool:

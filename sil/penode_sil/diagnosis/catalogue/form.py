@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -16,6 +16,7 @@ from penode_gen.model import Model
 from penode_gen.twins.numeric import along
 
 from ..plant.plant import Place
+from ..study.fit import Series
 from . import memory
 
 Array = NDArray[np.float64]
@@ -60,9 +61,9 @@ class Motion:
     def of(parts: Iterable[Moved], force: float = 0.0) -> Motion:
         parts = tuple(parts)
         s, v = (np.concatenate([getattr(p, k) for p in parts]) for k in "sv")
-        rms = [float(np.sqrt(np.mean(x**2))) for x in (s, v)]
-        reach = [float(np.quantile(np.abs(x), 0.999)) for x in (s, v)]
-        return Motion(parts, *rms, *reach, force)
+        s_rms, v_rms = (float(np.sqrt(np.mean(x**2))) for x in (s, v))
+        s_reach, v_reach = (float(np.quantile(np.abs(x), 0.999)) for x in (s, v))
+        return Motion(parts, s_rms, v_rms, s_reach, v_reach, force)
 
     @property
     def rates(self) -> Array:
@@ -111,14 +112,6 @@ class Part:
         text = known.force if known else self.law
         values = {self.gain[0]: 1.0, **shapes, "s": m.s, "v": m.v, **({"load": m.loads[self.load]} if self.load else {})}
         return np.broadcast_to(along(text, tuple(values))(*values.values()), m.s.shape)
-
-
-@dataclass(frozen=True, eq=False)
-class Series:
-    """What is added to an input: a signal [n] for each recording; of a hold also its period [s]."""
-
-    signals: Sequence[Array]
-    period: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,7 +66,7 @@ class _Counts:
 
 
 def broken_sensors(
-    model: Model, train: Sequence[Measured], study: Study, simulated: Sequence[np.ndarray], bursts: Sequence[NDArray[np.bool_]]
+    model: Model, train: Sequence[Measured], study: Study, simulated: Sequence[NDArray[np.float64]], bursts: Sequence[NDArray[np.bool_]]
 ) -> list[Cause]:
     """Sensors that clip or drop out, by their samples and a simulation that confirms it: it continues where they stop."""
     found = []
@@ -82,7 +82,7 @@ def broken_sensors(
     return found
 
 
-def _count(c: _Counts, m: Measured, name: str, simulated: np.ndarray, sigma: float, burst: NDArray[np.bool_]) -> None:
+def _count(c: _Counts, m: Measured, name: str, simulated: NDArray[np.float64], sigma: float, burst: NDArray[np.bool_]) -> None:
     """Adds one recording, whose noise has the deviation sigma; `burst` [n]: samples that are far from a simulation [n]."""
     channel, n = m.quality.channels[name], len(burst)
     y = m.z[name][:n]
@@ -98,10 +98,10 @@ def _count(c: _Counts, m: Measured, name: str, simulated: np.ndarray, sigma: flo
         at = flagged & (np.abs(y - rail) < 1e-6 * abs(rail))
         railing |= at
         if np.mean(side * (simulated[at] - rail) > -4.0 * sigma) > 0.5:
-            c.clipped += np.count_nonzero(at)
+            c.clipped += int(np.count_nonzero(at))
             c.rails[end] = rail
         else:  # a rail that the signal was not near
-            c.railed += np.count_nonzero(at)
+            c.railed += int(np.count_nonzero(at))
     bad, wrong = channel.held + channel.spikes, flagged & off & ~railing
     still = channel.held > max(FEW, STILL * n) and channel.quantum < 0.3 * sigma  # noise does not repeat itself
     c.proven |= bad > 0 and bool(still or np.count_nonzero(wrong) > 0.2 * bad)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +25,12 @@ from ..extend.entries import extends, table
 from ..result import OUTSIDE, Cause, Diagnosis
 from ..search.worth import RIGHT
 from ..study.fit import Free, Problem
-from ..study.noise import Experiment, metric
+from ..study.noise import Experiment, Metric, metric
 from ..study.study import guessed, uncertain
 from .plausible import LITTLE, UNLIKE
 
 Array = NDArray[np.float64]
+Samples = TypeVar("Samples", Array, NDArray[np.bool_])
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Mix:
         own, order = list(self.numbers), list(self.numbers[::-1])
         sign = -1.0 if len(own) == 1 else 1.0
 
-        def put(x: Array) -> Array:
+        def put(x: Samples) -> Samples:
             x = x.copy()
             x[:, own] = sign * x[:, order] if x.dtype != bool else x[:, order]
             return x
@@ -107,7 +109,7 @@ def _explains(m: Mix, before: Array, after: Array) -> bool:
     return bool(enough and np.all(after < UNLIKE) and np.all(after <= before))
 
 
-def _metric(model: Model, e: Experiment) -> object:
+def _metric(model: Model, e: Experiment) -> Metric:
     """Equal weight of all samples, relative to the signal of each sensor."""
     power = np.array([max(LITTLE * LITTLE * _power(e, j), 1e-300) for j in range(len(model.sensors))])
     return metric(e, np.tile(power, (e.band, 1)), np.zeros((e.band, len(power), len(model.inputs))))
@@ -119,7 +121,7 @@ def _power(e: Experiment, j: int) -> float:
     return float(np.var(y)) or 1.0 if y.size else 1.0
 
 
-def _missed(model: Model, experiments: Sequence[Experiment], metrics: Sequence[object], set_name: str, free: bool) -> tuple[Array, float]:
+def _missed(model: Model, experiments: Sequence[Experiment], metrics: Sequence[Metric], set_name: str, free: bool) -> tuple[Array, float]:
     """Share of each sensor's power [n_z] that the model misses with starts as they fit best, NaN where none was measured, and the sum of
     their logarithms, in which less than LITTLE does not count. `free`: parameters may have any value of their sign."""
     values = [p for p in model.parameters.values() if p.value and not p.exact and (free or p.name in guessed(model))]

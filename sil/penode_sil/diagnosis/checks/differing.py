@@ -19,7 +19,8 @@ from ..result import Cause, Diagnosis, Named, Value
 from ..search.worth import RIGHT, Z_95
 from ..study.fit import Fit, Free, Problem
 from ..study.noise import UNSEEN
-from ..study.residual import rms, stated_noise
+from ..study.residual import stated_noise
+from ..study.restoring import rms
 from ..study.study import Study, look
 from . import numerics
 from .case import Case, End
@@ -86,7 +87,7 @@ def _beyond(study: Study, k: int, noise: np.ndarray) -> bool:
     """Is recording k beyond the model, whatever the values of its parameters are?"""
     one = replace(study, experiments=study.experiments[k : k + 1])
     problem = Problem(study.model, one.experiments, study.metrics[k : k + 1], study.set_name, study.linear.fastest)
-    starts = [replace(f, target=("start", 0, f.target[2])) for f in study.null.free if f.of("start", k)]
+    starts = [f.alone(k) for f in study.null.free if f.of("start", k)]
     free = [_free(p) for p in study.model.parameters.values() if not p.exact and p.value]
     return _missed(one, problem.solve([*free, *starts]), noise)
 

@@ -52,9 +52,9 @@ def _bridged(r: Array, good: NDArray[np.bool_]) -> Array:
 def _usual(e: Experiment, r: Array) -> Array:
     """How far each sensor usually is from the model. At rest a coarse one shows its model's zero: in motion it is a quarter of a
     quantum off, in the median."""
-    gaps = [np.diff(np.unique(y)) for y in e.y.T]
-    quanta = np.array([np.median(g) if g.size else 0.0 for g in gaps])
-    return 1.4826 * np.maximum(np.median(np.abs(r), axis=0), 0.25 * quanta) + 1e-300
+    quanta = np.array([np.median(gaps) if gaps.size else 0.0 for gaps in (np.diff(np.unique(y)) for y in e.y.T)])
+    usual: Array = 1.4826 * np.maximum(np.median(np.abs(r), axis=0), 0.25 * quanta) + 1e-300
+    return usual
 
 
 def _frozen(e: Experiment, z: Array, r: Array) -> NDArray[np.bool_]:

@@ -5,7 +5,7 @@ its file allows, of the written extended one, and the noise; and the figures of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,10 +19,10 @@ from ...replay import Replay
 from ..extend.beginning import begins_at_rest
 from ..extend.measuring import achieved
 from ..result import Diagnosis, Figure, Gain
-from ..study.fit import Free, Problem
+from ..study.fit import Free, Problem, Target
 from ..study.noise import UNSEEN, Experiment, metric
-from ..study.residual import Channel, channels, noise_floor, noise_rms, rms, stated_noise
-from ..study.restoring import Surface, surfaces
+from ..study.residual import Channel, channels, noise_floor, noise_rms, stated_noise
+from ..study.restoring import Surface, rms, surfaces
 from ..study.study import Study, fitted, uncertain
 from .case import Case, End
 
@@ -143,7 +143,7 @@ def _refitted(case: Case, study: Study) -> dict[str, Array]:
     problem = Problem(case.model, study.experiments, study.metrics, study.set_name, study.linear.fastest)
     fit = problem.solve([*free, *_starts(case, study, len(study.experiments), fitted_to)])
     found = dict(zip((e.name for e in study.experiments), fit.simulated, strict=True))
-    model = fitted(case.model, fit)
+    model = fitted(case.model, fit.free)
     for e in case.unused:
         metrics = [metric(e, study.levels[0][:1].repeat(e.band, 0), np.zeros((e.band, len(model.sensors), len(model.inputs))))]
         one = Problem(model, [e], metrics, study.set_name, study.linear.fastest)
@@ -151,7 +151,7 @@ def _refitted(case: Case, study: Study) -> dict[str, Array]:
     return found
 
 
-def _starts(case: Case, study: Study, count: int, fitted_to: dict[object, float]) -> list[Free]:
+def _starts(case: Case, study: Study, count: int, fitted_to: Mapping[Target, float]) -> list[Free]:
     """Free starts of `count` recordings, and offsets of all sensors."""
     model = case.model
     free = [Free(("bias", j), 0.0, float(level)) for j, level in enumerate(noise_rms(study))]
@@ -197,8 +197,8 @@ def _gain(table: Table, name: str, g: Gain) -> Gain:
     if not own:
         return g
     before, after = (_together(own, what) for what in ("nominal", "extended"))
-    errors = [np.concatenate([r.errors[what] for r in own]) for what in ("nominal", "extended")]
-    share, ci95 = achieved(*errors, g.noise_floor)
+    nominal, extended = (np.concatenate([r.errors[what] for r in own]) for what in ("nominal", "extended"))
+    share, ci95 = achieved(nominal, extended, g.noise_floor)
     return replace(g, before_rmse=before, after_rmse=after, share_of_achievable=share, share_ci95=ci95)
 
 
@@ -206,7 +206,7 @@ def _together(rows: Sequence[Row], what: str) -> float:
     """RMS error over all samples of several recordings, in SI."""
     per, found = units.factor(rows[0].figure.unit), [(r.figure.samples, getattr(r.figure, what)) for r in rows]
     if len(found) == 1:
-        return found[0][1] * per  # to the digit
+        return float(found[0][1] * per)  # to the digit
     return per * float(np.sqrt(sum(n * x**2 for n, x in found) / sum(n for n, _ in found)))
 
 

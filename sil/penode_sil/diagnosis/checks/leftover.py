@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..study.fit import Fit
 from ..study.noise import ALIKE, UNSEEN, correlation
-from ..study.residual import rms
+from ..study.restoring import rms
 from ..study.study import Study
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ def left_over(study: Study, simulated: Sequence[Array]) -> bool:
 
 def beyond_noise(excess: float, rows: float) -> bool:
     """Is chi2 so much in excess of its `rows` that it is neither chance nor an error in the spectrum of the noise?"""
-    return excess > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows)
+    return bool(excess > max(DOUBT * np.sqrt(2.0 * rows), 0.15 * rows))
 
 
 def chi2(study: Study, simulated: Sequence[Array]) -> float:
@@ -44,7 +44,7 @@ def rows(study: Study) -> float:
 
 def only_noise(study: Study, fit: Fit) -> bool:
     """Does a fit leave no more than noise? Of few chi2 it is, what a wrong form leaves is hundreds of deviations more."""
-    return fit.chi2 < rows(study) + CHANCE * np.sqrt(2.0 * rows(study))
+    return bool(fit.chi2 < rows(study) + CHANCE * np.sqrt(2.0 * rows(study)))
 
 
 def within(study: Study, simulated: Sequence[Array], noise: Array) -> bool:

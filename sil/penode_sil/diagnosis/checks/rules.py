@@ -107,6 +107,8 @@ def burdens(case: Case, end: End, table: Table) -> list[tuple[str, str]]:
 
 def relieved(case: Case, end: End, table: Table, gone: Sequence[tuple[str, str]]) -> End:
     """The end without them, if it is not worse for any sensor in training."""
+    if end.without is None:
+        return end
     written = case.output / EXTENDED
     before, lighter = written.read_text(), end.without(gone)
     again = tabled(case, lighter)

@@ -111,7 +111,8 @@ def _multiples(inputs: Array, step: float, top: int) -> NDArray[np.bool_]:
     bins = np.arange(HALF, top)[:, None]
     own = np.argmax(_seconds(np.diff(inputs, axis=0, append=inputs[-1:]), step), axis=1)[:, None, None, :]
     orders = np.arange(1, ORDERS + 1)[:, None]
-    return np.any(np.abs(bins[:, None] - orders * own) <= 2 + orders // 3, axis=(2, 3))
+    found: NDArray[np.bool_] = np.any(np.abs(bins[:, None] - orders * own) <= 2 + orders // 3, axis=(2, 3))
+    return found
 
 
 def _seconds(signals: Array, step: float) -> Array:
@@ -131,7 +132,8 @@ def _pureness(power: Array) -> Array:
     around = sliding_window_view(power, 2 * HALF + 1, axis=1)
     beside = np.median(np.delete(around, [HALF - 1, HALF, HALF + 1], axis=-1), axis=-1) / np.log(2.0)
     sides = np.maximum(*(around[..., HALF + a : HALF + a + 3].mean(axis=-1) for a in (-4, 2)))
-    return power[:, HALF:-HALF] / np.maximum(np.maximum(beside, sides), 1e-300)
+    pure: Array = power[:, HALF:-HALF] / np.maximum(np.maximum(beside, sides), 1e-300)
+    return pure
 
 
 def _says(pure: Array) -> Array:

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtri, erfc
 
 from penode_gen import units
@@ -92,7 +93,7 @@ def _promising(whole: Few, count: int) -> list[tuple[str, ...]]:
     return sorted(lost, key=lambda names: lost[names])[: len(own)]
 
 
-def _absorbed(curvature: np.ndarray, kept: list[int], free: list[int]) -> np.ndarray:
+def _absorbed(curvature: NDArray[np.float64], kept: list[int], free: list[int]) -> NDArray[np.float64]:
     """What free values take of the curvature of those kept."""
     cross = curvature[np.ix_(kept, free)]
     return cross @ np.linalg.pinv(curvature[np.ix_(free, free)], rcond=1e-10, hermitian=True) @ cross.T
@@ -118,7 +119,7 @@ def _free(p: Parameter) -> Free:
     return Free(p.name, p.value, abs(p.value), log=True, origin=p.value)
 
 
-def _behind(end: End, fit: Fit, extended: list[np.ndarray]) -> bool:
+def _behind(end: End, fit: Fit, extended: list[NDArray[np.float64]]) -> bool:
     """Does a fit follow a sensor in training worse than the extended model?"""
     for e, z, own in zip(end.study.experiments, extended, fit.simulated, strict=True):
         for j in range(e.y.shape[1]):

@@ -203,9 +203,9 @@ def _guess(bench: Bench, model: Model, spans: Array) -> Array:
 def smooth(x: Array, width: int) -> Array:
     """Means over about `width` samples on either side, of signals [n, .]."""
     total = np.cumsum(np.vstack([np.zeros((1, x.shape[1])), x]), axis=0)
-    at = np.arange(len(x))
-    low, high = np.maximum(at - width, 0), np.minimum(at + width + 1, len(x))
-    return (total[high] - total[low]) / (high - low)[:, None]
+    low, high = (np.clip(np.arange(len(x)) + side, 0, len(x)) for side in (-width, width + 1))
+    means: Array = (total[high] - total[low]) / (high - low)[:, None]
+    return means
 
 
 def fit_null(bench: Bench) -> Bench:

@@ -55,7 +55,8 @@ def shape(experiments: Sequence[Experiment], levels: Sequence[Array]) -> Array:
     the band of each: above it noise stays as it is at its end."""
     at = experiments[0].frequencies * experiments[0].step
     own = [(e.frequencies[: len(x)] * e.step, x.T) for e, x in zip(experiments, levels, strict=True)]
-    return np.mean([[np.interp(at, f, column) for column in columns] for f, columns in own], axis=0).T
+    mean: Array = np.mean([[np.interp(at, f, column) for column in columns] for f, columns in own], axis=0)
+    return mean.T
 
 
 def is_white(shape: Array) -> bool:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..study.fit import Free
+from ..study.fit import Free, Target
 from .colour import Colour
 from .observer import Filter, Predictor
 from .prior import cost, precisions, slopes as prior_slopes
@@ -34,7 +34,7 @@ class Fit:
     likelihood: float
     cost: float
 
-    def value(self, target: object) -> float:
+    def value(self, target: Target) -> float:
         return next(f.value for f in self.free if f.target == target)
 
     @property
@@ -46,7 +46,7 @@ class Fit:
         rows = (self.slopes / np.sqrt(self.variance)[None, :, None])[self.used]
         return rows.T @ rows + np.diag(precisions(self.free) ** 2)
 
-    def covariance(self, known: Collection[object] = ()) -> Array:
+    def covariance(self, known: Collection[Target] = ()) -> Array:
         """Of the free values, in their units (log: relative), where some targets are `known`."""
         c = self.curvature()
         at = [f.target in known for f in self.free]
@@ -54,7 +54,7 @@ class Fit:
         size = 1.0 / np.sqrt(np.maximum(np.diag(c), 1e-300))
         return np.linalg.pinv(np.nan_to_num(c * np.outer(size, size)), rcond=1e-12, hermitian=True) * np.outer(size, size)
 
-    def deviation(self, target: object, known: Collection[object] = ()) -> float:
+    def deviation(self, target: Target, known: Collection[Target] = ()) -> float:
         """Standard deviation of a value, in its own unit, where some targets are `known`."""
         i = [f.target for f in self.free].index(target)
         f = self.free[i]
@@ -64,7 +64,7 @@ class Fit:
         """Share [n_z] of the power of each sensor's innovations beyond that of its noise, `floor` [n_z], that another fit takes away; what
         is within three deviations of an estimate of power from so many updates is noise."""
         count = np.maximum(np.sum(self.used, axis=0), 1)
-        beyond = np.maximum(self.variance - floor, 3.0 * np.sqrt(2.0 / count) * self.variance)
+        beyond: Array = np.maximum(self.variance - floor, 3.0 * np.sqrt(2.0 / count) * self.variance)
         return np.clip((self.variance - after.variance) / beyond, 0.0, 1.0)
 
     def taken_whole(self, after: Fit, floor: Array) -> float:
@@ -79,7 +79,7 @@ class Fit:
         likelihood, priors, and the width of the posterior against theirs."""
         prior = np.array([(1.0 if f.log else f.unit) / f.sigma for f in self.free])
         own = prior > 0.0  # what has no prior is free in all fits
-        _, volume = np.linalg.slogdet(self.curvature())
+        volume: float = np.linalg.slogdet(self.curvature())[1]
         return self.likelihood - sum(map(cost, self.free)) + float(np.sum(np.log(prior[own]))) - 0.5 * volume
 
 
@@ -116,9 +116,8 @@ class Problem:
 
     def at(self, free: Sequence[Free], by: Filter) -> Fit:
         """The fit that ends at these free values."""
-        small = np.array(
-            [MOVE * MOVE if f.log else MOVE for f in free]
-        )  # else a common scale of all forces would seem to bend what is seen
+        # larger ones of a logarithm would make a common scale of all forces seem to bend what is seen
+        small = np.array([MOVE * MOVE if f.log else MOVE for f in free])
         shifts = np.vstack([np.zeros(len(free)), np.diag(small)])
         for i, f in enumerate(free):
             if f.at(small[i]) == f.value:

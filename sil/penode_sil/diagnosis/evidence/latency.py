@@ -13,6 +13,7 @@ from scipy import ndimage
 from . import samples
 
 Array = NDArray[np.float64]
+Spectrum = NDArray[np.complexfloating]
 
 
 def moved(x: Array, count: Array) -> Array:
@@ -42,11 +43,11 @@ def amplified(y: Array, lags: Array, update: int) -> Array:
     `update` samples."""
     moving = _moving(_spectrum(y))
     turns = np.pi * np.arange(len(moving) // update) / (len(moving) - 1)
-    larger = np.log(np.abs(1.0 + 1j * lags[:, None] * turns))
-    return np.exp(np.mean(larger * moving[: len(turns)], axis=1))
+    larger: Array = np.mean(np.log(np.abs(1.0 + 1j * lags[:, None] * turns)) * moving[: len(turns)], axis=1)
+    return np.exp(larger)
 
 
-def _filtered(y: Array, shifts: Array, response: Callable[[Array], Array]) -> Array:
+def _filtered(y: Array, shifts: Array, response: Callable[[Array], Spectrum]) -> Array:
     """A signal [n] earlier by so many samples [runs], by the `response` to the turn [rad] in that time; noise stays as it is."""
     spectrum = _spectrum(y)
     each, runs = np.unique(shifts, return_inverse=True)  # of the runs of a fit, most share it
@@ -68,17 +69,17 @@ def _line(y: Array) -> tuple[float, float]:
     return x[0], (x[-1] - x[0]) / max(len(x) - 1, 1)
 
 
-def _spectrum(y: Array) -> Array:
-    """Of a signal [n] about the line through its ends, and reflected in them, so that neither value nor slope jumps there: [n], complex."""
+def _spectrum(y: Array) -> Spectrum:
+    """Of a signal [n] about the line through its ends, and reflected in them, so that neither value nor slope jumps there: [n]."""
     start, slope = _line(y)
     rest = _whole(y) - start - slope * np.arange(len(y))
     return np.fft.rfft(np.concatenate([rest, -rest[-2:0:-1]]))
 
 
-def _moving(spectrum: Array) -> NDArray[np.bool_]:
+def _moving(spectrum: Spectrum) -> NDArray[np.bool_]:
     """Frequencies [n] with at least twice the power of the quietest part of a spectrum. Others show noise, whose derivative is no evidence
     of a delay, and would hide what is."""
     width = max(len(spectrum) // samples.SEGMENT, 1)
-    power = ndimage.uniform_filter1d(np.abs(spectrum) ** 2, width)
-    noise = 2.0 * np.min(power)  # means of noise scatter by less than that
+    power: Array = ndimage.uniform_filter1d(np.abs(spectrum) ** 2, width)
+    noise: float = 2.0 * np.min(power)  # means of noise scatter by less than that
     return power > noise

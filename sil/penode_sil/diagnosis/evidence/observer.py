@@ -263,15 +263,15 @@ class Predictor:
         there = np.isfinite(whole)
         counts = np.sum(there, axis=1)
         means = np.where(counts > 0, np.sum(np.where(there, whole, 0.0), axis=1) / np.maximum(counts, 1), np.nan)
-        return means.transpose(2, 0, 1), np.isfinite(z).all(axis=(1, 2))
+        return means.transpose(2, 0, 1), np.all(np.isfinite(z), axis=(1, 2))
 
     def _as_measured(self, e: int, nu: Array, free: Sequence[Free], shifts: Array) -> Array:
         """Innovations [runs, updates, n_z] in units in which densities are those of what was measured: without a lag, a sensor of
         recording `e` has more power, noise too."""
         for f, shift in zip(free, shifts.T, strict=True):
-            if f.target[0] == "lag":
-                y, step = self.records[e].y[:, f.target[1]], self.records[e].step
-                nu[:, :, f.target[1]] /= latency.amplified(y, f.at(shift) / step, self.update)[:, None]
+            match f.target:
+                case "lag", j:
+                    nu[:, :, j] /= latency.amplified(self.records[e].y[:, j], f.at(shift) / self.records[e].step, self.update)[:, None]
         return nu
 
     def _blocks(self, x: Array) -> Array:
@@ -297,22 +297,23 @@ class Predictor:
         u, y = record.u, record.y
         for f, shift in sorted(zip(free, shifts.T, strict=True), key=lambda pair: _order(pair[0])):
             values = f.at(shift)
-            if isinstance(f.target, str):
-                parameters[f.target] = values
-            elif f.target[0] == "start":
-                if f.target[1] == e:
-                    start[:, f.target[2]] = values
-            elif f.target[0] in latency.BEFORE:
-                y = np.array(np.broadcast_to(y, (runs, *y.shape[-2:])))
-                y[:, :, f.target[1]] = latency.BEFORE[f.target[0]](record.y[:, f.target[1]], values / record.step)
-            elif f.target[0] == "input_added":
-                u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
-                u[:, :, f.target[1]] += values[:, None] * f.target[2].signals[e]
-            else:
-                u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
-                actuator = ACTUATORS[f.target[0]]
-                output = (self.stepped and actuator.smoothed) or actuator.output
-                u[:, :, f.target[1]] = output(u[:, :, f.target[1]], values, record.step)
+            match f.target:
+                case str(name):
+                    parameters[name] = values
+                case "start", recording, state:
+                    if recording == e:
+                        start[:, state] = values
+                case "input_added", j, added:
+                    u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
+                    u[:, :, j] += values[:, None] * added.signals[e]
+                case what, j if what in latency.BEFORE:
+                    y = np.array(np.broadcast_to(y, (runs, *y.shape[-2:])))
+                    y[:, :, j] = latency.BEFORE[what](record.y[:, j], values / record.step)
+                case what, j:
+                    u = np.array(np.broadcast_to(u, (runs, *u.shape[-2:])))
+                    actuator = ACTUATORS[what]
+                    output = (self.stepped and actuator.smoothed) or actuator.output
+                    u[:, :, j] = output(u[:, :, j], values, record.step)
         return np.clip(np.nan_to_num(start), -MAX_INNOVATION, MAX_INNOVATION), parameters, self._finer(e, u), y
 
 

@@ -104,7 +104,7 @@ def scores(fit: Fit, hypotheses: Sequence[Array]) -> list[Score]:
         if np.any(np.sum(columns**2, axis=0) < NEARLY * before) or not before.all():
             found.append(Score(0.0, np.zeros(h.shape[2])))
             continue
-        theta = np.linalg.lstsq(columns, -beside.rest, rcond=1e-9)[0]
+        theta = np.asarray(np.linalg.lstsq(columns, -beside.rest, rcond=1e-9)[0], float)
         found.append(Score(beside.gain(float(np.sum((beside.rest + columns @ theta) ** 2))), theta))
     return found
 

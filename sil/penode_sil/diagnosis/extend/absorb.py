@@ -60,7 +60,7 @@ def absorbed(case: Case, study: Study, terms: Sequence[Term], values: Mapping[st
     model = penode_gen.load(write(study, values, learnt, beside, case.output))
     gain = measuring.measure(study, model, case.unused, SET)[0] if case.unused else {}
     names = ", ".join(t.element for t in learnt)
-    entry = {"file": FILE, "set": SET, "networks": {t.port: {"missing": t.missing} for t in learnt}, "gain": gain}
+    entry: dict[str, object] = {"file": FILE, "set": SET, "networks": {t.port: {"missing": t.missing} for t in learnt}, "gain": gain}
     after = ", ".join(f"{k} {g.after_rmse:.3g} {g.unit}" for k, g in gain.items())
     note = f"{names} can learn it: {FILE} has a set for the code that runs already"
     return entry, [note + f"; hold-out after: {after}" * bool(after)]
@@ -140,7 +140,7 @@ def learn(network: Network, x: Array, wanted: Array) -> tuple[Network, float]:
         square, down = slopes.T @ slopes, slopes.T @ off
         scale = np.diag(square) + 1e-9 * np.max(np.diag(square))
         while damping < 1e8:
-            trial = moved(network, np.linalg.solve(square + damping * np.diag(scale), down))
+            trial = moved(network, np.asarray(np.linalg.solve(square + damping * np.diag(scale), down), float))
             left = wanted - trial.evaluate(x)[:, 0]
             if left @ left < off @ off:
                 break

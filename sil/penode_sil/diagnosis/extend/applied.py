@@ -51,7 +51,7 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     moved = redirected(model, driven)
     own = [(e, bench.places[t.form.index]) for t in forces for e in bench.model.elements if e.name in t.elements]
     grown = extend(model, [e for e, _ in own], {}, [place for _, place in own])
-    limits = {t.form.index: [values[f.target] for f in t.free] for t in terms if t.form.how == "clip"}
+    limits = {t.form.index: [fit.value(f.target) for f in t.free] for t in terms if t.form.how == "clip"}
     texts = [driven.through(named(s.expression)) for s in grown.sensors]
     delays = {t.form.index: (t.form.how, fit.value(t.free[0].target)) for t in terms if t.form.how in late.HOW}
     room = model.filter is None  # whose states a file lists, with how sure each is at the start
@@ -279,7 +279,7 @@ def redirected(model: Model, driven: Driven) -> dict[str, list[str]]:
     """Elements, equations and outputs on which inputs act, with the expressions that replace these."""
     found: dict[str, list[str]] = {"elements": [], "equations": [], "outputs": []}
     for e in model.elements:
-        ends = tuple(driven.acts.get(x, x) for x in e.ends)
+        ends = driven.acts.get(e.ends[0], e.ends[0]), driven.acts.get(e.ends[1], e.ends[1])
         text = driven.through(e.expression)
         if ends != e.ends or text != e.expression:
             entry = _element(Element(e.name, ends, e.law, e.arguments, e.network, e.network_inputs, text), lambda x: x)

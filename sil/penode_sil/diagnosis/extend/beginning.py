@@ -46,9 +46,8 @@ def start_of(model: Model, e: Experiment, study: Study, set_name: str = "", at_r
         return start
     if begins_at_rest(model, e, study, set_name) if at_rest is None else at_rest:
         return start
-    _, free, problem, by = _first(model, e, study, set_name)
-    for f in problem.solve(free, by).free:
-        start[f.target[2]] = f.value
+    own, free, problem, by = _first(model, e, study, set_name)
+    start[own] = [f.value for f in problem.solve(free, by).free]
     return start
 
 

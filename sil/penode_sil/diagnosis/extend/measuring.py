@@ -21,7 +21,8 @@ from ..plant.compiling import moving
 from ..result import Gain
 from ..study.fit import Free, Problem
 from ..study.noise import Experiment, metric
-from ..study.residual import Channel, channels, noise_floor, noise_rms, rms
+from ..study.residual import Channel, channels, noise_floor, noise_rms
+from ..study.restoring import rms
 from ..study.smoother import size
 from ..study.study import Study, watched, widened
 from .beginning import begins_at_rest, start_of
@@ -77,8 +78,8 @@ def measure(
         beyond = np.any(np.abs(paths) > np.array(limits), axis=1)
         outside.append(beyond)
         if beyond.any():
-            share = f"{np.mean(beyond):.1%} of the samples move farther or faster than in training"
-            notes.append(f"{e.name}: {share}; there the gain is extrapolated")
+            many = f"{np.mean(beyond):.1%} of the samples move farther or faster than in training"
+            notes.append(f"{e.name}: {many}; there the gain is extrapolated")
         shown += channels(e, model, before, after, floors, beyond)
     noise = noise_rms(study)
     gains = {}
@@ -87,13 +88,13 @@ def measure(
         if not own:
             continue
         floor = float(noise[j])
-        errors = [
+        nominal, improved = (
             np.concatenate([r.values[c.good] for c, r in zip(own, each, strict=True)])
-            for each in ([c.before for c in own], [c.after for c in own])
-        ]
-        share, ci95 = achieved(*errors, floor)
+            for each in ([c.before for c in own], [c.after for c in own if c.after])
+        )
+        share, ci95 = achieved(nominal, improved, floor)
         beyond = float(np.mean(np.concatenate(outside)))
-        gains[s.name] = Gain(rms(errors[0]), rms(errors[1]), floor, share, units.si(s.unit), beyond, ci95)
+        gains[s.name] = Gain(rms(nominal), rms(improved), floor, share, units.si(s.unit), beyond, ci95)
     return gains, notes, shown
 
 

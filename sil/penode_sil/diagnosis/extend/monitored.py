@@ -88,8 +88,8 @@ def _text(text: str, extended: Model, watched: dict[str, dict[str, float]]) -> s
         entry = {}
         for parameter, change in own.items():
             factor = units.factor(extended.parameters[parameter].unit)
-            healthy = (extended.parameters[parameter].value - change) / factor
-            text = re.sub(rf"(?m)^({parameter} = \{{ value = )[^,}}]*", lambda m, value=healthy: m[1] + toml(float(value)), text)
+            healthy = toml(float((extended.parameters[parameter].value - change) / factor))
+            text = re.sub(rf"(?m)^({parameter} = \{{ value = )[^,}}]*", rf"\g<1>{healthy}", text)
             entry[parameter] = change / factor
         causes.append(f"{name} = {table(entry)}")
     text = re.sub(r'(?m)^name = ".*"$', f"name = {toml(extended.name.removesuffix('_extended') + '_monitored')}", text, count=1)

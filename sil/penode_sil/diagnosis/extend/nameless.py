@@ -52,7 +52,7 @@ def fitted(study: Study, bench: Bench, run: Fit, terms: Sequence[Term]) -> Namel
     if at is None:
         return None
     place, (part, weights) = study.places[at], _taught(study, at)
-    parameters = {f.target: (f.value, u) for f, u in zip(weights, _units(part), strict=True)}
+    parameters = {str(f.target): (f.value, u) for f, u in zip(weights, _units(part), strict=True)}
     model = extend(bench.model, [element(ELEMENT, place.ends, part)], parameters, [place])
     problem, still = bench.problem(model), Filter.none(len(model.states), len(bench.noise))
     fit = problem.solve((*run.free, *weights), still, FIRST)
@@ -86,7 +86,7 @@ def _taught(study: Study, at: int) -> tuple[Part, list[Free]]:
     force = np.concatenate([s.forces[at] for s in study.seen])
     pick = np.random.default_rng(0).choice(len(x), min(len(x), POINTS), replace=False)
     tries = [learn(_random(seed, float(np.std(force))), x[pick], force[pick]) for seed in range(STARTS)]
-    first, last = min(tries, key=lambda t: t[1])[0].layers
+    first, last = (layer for layer in min(tries, key=lambda t: t[1])[0].layers if isinstance(layer, Dense))
     free, shapes = [], {}
     for i, (row, offset, k) in enumerate(zip(first.weights, first.bias, last.weights[0], strict=True), 1):
         for key, start, scale, unit in (

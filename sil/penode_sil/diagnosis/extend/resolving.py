@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import penode_gen
 from penode_gen.model import INTERPOLATIONS, Model
 
-from ..study.residual import rms
+from ..study.restoring import rms
 from ..study.study import Study
 from .measuring import deployed, started
 

@@ -26,7 +26,7 @@ def far(step: float, signals: Sequence[Array]) -> bool:
 
 def finer(u: Array, step: float, count: int) -> Array:
     """Smooth signals [..., n, n_u], `step` [s] apart, with `count` intervals for each: 2, or 3 for a model that uses their rates."""
-    time = np.arange(u.shape[-2]) * step
+    time = np.arange(0.0, u.shape[-2]) * step
     return joined(parts(time, u, CubicSpline(time, u, axis=-2)(time, 1) if count == 3 else u, count), u)
 
 

@@ -121,12 +121,11 @@ def moving_ends(model: Model) -> set[str]:
 def _trained(model: Model, e: Element, set_name: str) -> list[tuple[str, str, float, float, bool]]:
     """Where its network was trained; if it does not say, where eight tenths of its kinks are: it is straight beyond them."""
     network = model.sets[set_name].networks[e.network]
-    low, high = network.input_min, network.input_max
-    stated = low is not None and high is not None
-    if not stated:
+    low, high, stated = network.input_min, network.input_max, True
+    if low is None or high is None:
         if not fold.foldable(network) or len(kinks := fold.kinks(network)) < 3:
             return []
-        low, high = ([x] for x in np.quantile(kinks, (0.1, 0.9)))
+        (low, high), stated = np.quantile(kinks, (0.1, 0.9))[:, None], False
     ranges = zip(e.network_inputs, low, high, strict=True)
     return [(e.name, "s" if what == "deflection" else "v", float(low), float(high), stated) for what, low, high in ranges]
 
@@ -166,7 +165,7 @@ def extend(model: Model, elements: Sequence[Element], parameters: Mapping[str, t
 
 def _told_apart(model: Model, e: Element) -> Element:
     """An element whose expression has s_NAME and v_NAME for s and v where the model has others of that name."""
-    taken = {*model.states, *model.parameters, *(x.name for x in (*model.inputs, *model.variables))} & {"s", "v"}
+    taken = {*model.states, *model.parameters, *(x.name for x in model.inputs), *(x.name for x in model.variables)} & {"s", "v"}
     return replace(e, expression=re.sub(r"\b[sv]\b", lambda m: f"{m[0]}_{e.name}" if m[0] in taken else m[0], e.expression))
 
 

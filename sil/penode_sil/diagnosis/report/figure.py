@@ -38,7 +38,8 @@ class Axis:
         ends = np.array([self.low, self.high])
         if self.log:
             values, ends = np.log(np.maximum(values, 1e-300)), np.log(ends)
-        return (np.asarray(values) - ends[0]) / (ends[1] - ends[0])
+        found: Array = (np.asarray(values) - ends[0]) / (ends[1] - ends[0])
+        return found
 
     def ticks(self) -> list[tuple[float, str]]:
         """Share of the way and text: multiples of 1, 2 or 5, or whole decades with 2 and 5 in between where there is

@@ -60,5 +60,5 @@ def apart(term: Term) -> list[Term]:
         own = [(n, p) for n, p in zip(term.elements, term.form.parts, strict=True) if (p.kind or term.form.kind) == kind]
         names = tuple(n for n, _ in own)
         form = replace(term.form, kind=kind, parts=tuple(p for _, p in own), note="")
-        found.append(Term(form, names, tuple(f for f in term.free if any(f.target.startswith(f"{n}_") for n in names))))
+        found.append(Term(form, names, tuple(f for f in term.free if any(str(f.target).startswith(f"{n}_") for n in names))))
     return found

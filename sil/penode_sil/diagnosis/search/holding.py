@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model
 
-from ..catalogue.form import Form, Series
+from ..catalogue.form import Form
 from ..evidence.bench import AGAIN, CORRELATION, Bench, fit_level
 from ..evidence.blocks import Blocks
 from ..evidence.gain import Level
 from ..evidence.prior import stated
 from ..evidence.screening import AT_ONCE, Beside, as_they_are
-from ..study.fit import Free
+from ..study.fit import Free, Series
 from .terms import Trial
 
 Array = NDArray[np.float64]
@@ -59,8 +59,7 @@ def propose(bench: Bench, index: int, delay: float) -> Form | None:
     fitted = 1 + len(bench.records)  # the period, and a phase for each recording
     if about * SPREAD[1] <= 2.0 or sum(moves) < fitted + fitted:
         return None
-    steps = _likeliest(_finer(bench, about), index, about)
-    return Form(KIND, bench.model.inputs[index].name, "input_added", index, series=steps)
+    return Form(KIND, bench.model.inputs[index].name, "input_added", index, series=_likeliest(_finer(bench, about), index, about))
 
 
 def told_apart(bench: Bench, model: Model, trials: Sequence[Trial]) -> list[Trial]:
@@ -73,7 +72,7 @@ def told_apart(bench: Bench, model: Model, trials: Sequence[Trial]) -> list[Tria
 
 def _against(bench: Bench, model: Model, hold: Trial, delay: Trial) -> Trial:
     """A hold with the scores of a delay, and what it predicts better with updates that resolve its steps."""
-    fine = _finer(bench, hold.form.series.period / bench.step)
+    fine = _finer(bench, hold.form.series.period / bench.step) if hold.form.series else bench
     if fine is bench:
         return hold
     blocks, problem = Blocks.of([len(r) // fine.update for r in fine.records]), fine.problem(model)

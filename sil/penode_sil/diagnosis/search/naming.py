@@ -24,7 +24,7 @@ from ..evidence.observer import Filter, Record, bias, sample_noise
 from ..evidence.screening import Probe
 from ..plant.plant import Place
 from ..result import MAY_BE_NOTHING, Cause, Named, Value, place
-from ..study.fit import Free
+from ..study.fit import Free, Target
 from ..study.noise import Experiment
 from . import innovate, offsets as offsets_of, parameters
 from .innovate import Found
@@ -219,13 +219,12 @@ def _cause(
     """A term as a cause with sizes and intervals, along a motion of every place; `sure`: posterior of its name among the forms of the
     catalogue; `level`: the unmodelled force that remains."""
     form = term.form
-    file = catalogue.OF.get(form.kind, drives)
     own = {t.target for t in term.free}
     at = bench.places[form.index] if form.how == "force" else None
     first = moved[form.index].parts[0] if at else None
 
-    def sizes(values: Mapping[object, float]) -> dict[str, tuple[str, float]]:
-        if file is drives:
+    def sizes(values: Mapping[Target, float]) -> dict[str, tuple[str, float]]:
+        if at is None:
             unit = units.si((model.inputs if form.how.startswith("input_") else model.sensors)[form.index].unit)
             return drives.sizes(form, Sizes({}, {}, True, values[term.free[0].target]), unit)
         parts = {}
@@ -240,7 +239,7 @@ def _cause(
                     key = f"{e.law}.{argument}"
                     linear[key] = linear.get(key, 0.0) + values.get(parameter, model.parameters[parameter].value)
         known = Sizes(parts, linear, bool(model.bodies), first=first)
-        return {k: (at.unit(u), v) for k, (u, v) in file.sizes(form, known).items()}
+        return {k: (at.unit(u), v) for k, (u, v) in catalogue.OF[form.kind].sizes(form, known).items()}
 
     values = {f.target: f.value for f in bench.fit.free}
     found = sizes(values)
@@ -250,13 +249,13 @@ def _cause(
     for i, f in enumerate(bench.fit.free):
         if isinstance(f.target, str) or f.target in own:
             step = 1e-4
-            moved = sizes({**values, f.target: float(f.value * np.exp(step) if f.log else f.value + step * f.unit)})
+            there = sizes({**values, f.target: float(f.value * np.exp(step) if f.log else f.value + step * f.unit)})
             for key in found:
-                slopes[key][i] = (moved[key][1] - found[key][1]) / step
+                slopes[key][i] = (there[key][1] - found[key][1]) / step
     wider = _wider(bench, term, size, level)
     given = {}
     for key, (unit, value) in found.items():
-        sd = wider * float(np.sqrt(max(slopes[key] @ covariance @ slopes[key], 0.0)))
+        sd = wider * float(np.sqrt(max(float(slopes[key] @ covariance @ slopes[key]), 0.0)))
         if not slopes[key].any():  # looked for, not fitted: known as well as the size that goes with it
             alone = term.free[0].target
             sd = wider * abs(value) * bench.fit.deviation(alone, ratios) / max(abs(bench.fit.value(alone)), 1e-300)

@@ -99,7 +99,9 @@ class _Offsets:
     def _whole(self) -> Array:
         """Change [rows] of all offsets and start states as they were fitted: a load moves sensors that do not show it by themselves."""
         free, biases = self.bench.fit.free, {bias(s.name) for s in self.model.sensors}
-        return np.sum([self._of_free(i) * f.value for i, f in enumerate(free) if f.target in biases], axis=0) + self._of_starts.sum(axis=1)
+        offsets = [self._of_free(i) * f.value for i, f in enumerate(free) if f.target in biases]
+        whole: Array = np.sum(offsets, axis=0) + self._of_starts.sum(axis=1)
+        return whole
 
     @cached_property
     def _of_loads(self) -> list[tuple[Place, Array]]:
@@ -173,7 +175,8 @@ def shifts(bench: Bench, run: Fit, terms: Sequence[Term]) -> Array:
     own = {f.target for t in terms for f in t.free if not f.log}
     sizes = np.array([abs(f.value - f.origin) / f.unit * (f.target in own) for f in run.free])
     whitened = 1.0 if bench.colour is None else np.abs(1.0 - bench.colour.taps.sum(axis=0))  # of a mean, is left
-    return np.abs(np.nanmean(np.where(run.used[:, :, None], run.slopes, np.nan), axis=0)) @ sizes / whitened
+    found: Array = np.abs(np.nanmean(np.where(run.used[:, :, None], run.slopes, np.nan), axis=0)) @ sizes / whitened
+    return found
 
 
 def inputs_alike(model: Model, p: Place) -> tuple[Named, ...]:

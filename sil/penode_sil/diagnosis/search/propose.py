@@ -41,7 +41,7 @@ def motions(probe: Probe) -> list[Motion]:
         first = 3 * len(bench.places)
         loads |= {f"F_{e.name}": first + i for i, e in enumerate(driving) if {*e.ends} & {*place.ends} - {GROUND}}
         parts = [
-            Moved(m[:, 3 * k], m[:, 3 * k + 1], np.arange(len(m)) * bench.step, {f: np.abs(m[:, i]) for f, i in loads.items()}, r.left)
+            Moved(m[:, 3 * k], m[:, 3 * k + 1], np.arange(0.0, len(m)) * bench.step, {f: np.abs(m[:, i]) for f, i in loads.items()}, r.left)
             for m, r in zip(probe.motions, bench.records, strict=True)
         ]
         acts = float(np.std(np.concatenate([m[:, first + len(driving) + k] for m in probe.motions])))
@@ -204,7 +204,8 @@ def _slope(bench: Bench, form: Form) -> Array:
     shifts = np.zeros((2, len(free)))
     shifts[1, -1] = 0.1
     nu = problem.nu(free, shifts, bench.fit.by)
-    return (nu[1] - nu[0]) / (0.1 * f.unit)
+    slope: Array = (nu[1] - nu[0]) / (0.1 * f.unit)
+    return slope
 
 
 def _fitted(bench: Bench, base: Fit, wide: Model, moved: Sequence[Motion], terms: Sequence[Term], term: Term, sizes: Array) -> Trial:
@@ -226,10 +227,10 @@ def _fitted(bench: Bench, base: Fit, wide: Model, moved: Sequence[Motion], terms
     best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)
     same = [t for t in terms if (t.form.kind, t.form.where) == (term.form.kind, term.form.where)]
     level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
-    most = float(np.max(base.taken(best, problem.floor)))  # the force at one place is seen by few sensors
+    taken = float(np.max(base.taken(best, problem.floor)))  # the force at one place is seen by few sensors
     whole = base.taken_whole(best, problem.floor)
     gain, free = best.criterion() - base.criterion(), max((r.likelihood for r in runs), default=-np.inf)
-    return Trial(term.form, term, best, gain, level, share(bench, [*same, term], best, moved), most, whole, free)
+    return Trial(term.form, term, best, gain, level, share(bench, [*same, term], best, moved), taken, whole, free)
 
 
 def _sized(term: Term, sizes: Array) -> list[Free]:

@@ -47,8 +47,7 @@ def centred(rounds: Rounds, grown: Grown) -> Grown:
     none, sensors = {f.target for f in biases}, [s.name for s in rounds.start.model.sensors]
     off = tuple((others.OFFSET, s) for s, f in zip(sensors, biases, strict=True) if abs(f.value) > Z_95 * fit.deviation(f.target))
     for k, a in enumerate(grown.accepted):
-        values = {f.target: f.value for f in fit.free}
-        form = catalogue.aside(_fitted_shapes(a, values))
+        form = catalogue.aside(_fitted_shapes(a, fit.values))
         if form is None:
             continue
         form = replace(form, alike=off)
@@ -66,7 +65,7 @@ def centred(rounds: Rounds, grown: Grown) -> Grown:
     return grown
 
 
-def _fitted_shapes(a: Accepted, values: Mapping[object, float]) -> Form:
+def _fitted_shapes(a: Accepted, values: Mapping[str, float]) -> Form:
     """An accepted form with its shapes as they are fitted."""
     parts = [part for term in a.terms for _, part in term.laws(values)]
     return replace(a.trial.form, parts=tuple(parts))

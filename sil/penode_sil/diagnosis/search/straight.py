@@ -57,7 +57,7 @@ def _lines(model: Model, place: Place) -> list[tuple[str, str]]:
 def _slopes(terms: Sequence[Term], bench: Bench, quantity: str, x: Array) -> Slopes:
     """Slopes of the laws of terms over deflection or rate. One with memory has any slope from 0 to its gain."""
     zeros, force, low, high = np.zeros_like(x), np.zeros_like(x), 0.0, 0.0
-    along = Moved(x, zeros, np.arange(len(x)) * bench.step) if quantity == "s" else Moved(zeros, x, np.arange(len(x)) * bench.step)
+    along = Moved(*((x, zeros) if quantity == "s" else (zeros, x)), np.arange(0.0, len(x)) * bench.step)
     for gain, part in (pair for term in terms for pair in term.laws(bench.fit.values)):
         known = laws.LAWS.get(part.law)
         if known and known.states:

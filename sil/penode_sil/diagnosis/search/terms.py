@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,8 +49,8 @@ class Term:
 class Trial:
     """A form beside those accepted, fitted: `gain` of the criterion; `share` of the force there (see `worth`); `taken`, the share of
     a sensor's innovation power beyond its noise that it explains, of the sensor that shows it most; `whole`, that share over all sensors
-    together; `run`: log likelihood of its free run, where one was made; `blocks` [blocks] of predictive density; `model`: that of the fit,
-    where it is not that of all trials of its round."""
+    together; `run`: log likelihood of its free run, where one was made; `blocks` [blocks] of predictive density, none before it is scored;
+    `model`: that of the fit, where it is not that of all trials of its round."""
 
     form: Form
     term: Term
@@ -61,7 +61,7 @@ class Trial:
     taken: float = 0.0
     whole: float = 0.0
     run: float = -np.inf
-    blocks: Array | None = None
+    blocks: Array = field(default_factory=lambda: np.zeros(0))
     model: Model | None = None
 
 
@@ -80,8 +80,8 @@ def free_of(bench: Bench, form: Form) -> tuple[Free, ...]:
     """The value of a form of an input or a sensor."""
     step = bench.update * bench.step
     match form.how:
-        case "input_added":
-            return (Free((form.how, form.index, form.series), 0.0, 0.1, sigma=1.0, low=0.0, high=1.2),)
+        case "input_added" if form.series:
+            return (Free(("input_added", form.index, form.series), 0.0, 0.1, sigma=1.0, low=0.0, high=1.2),)
         case "scale":
             return (Free(scale(form.where), 1.0, 0.01, sigma=0.3, origin=1.0),)
         case "late" | "lag":
@@ -101,11 +101,12 @@ def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], fir
         if form.how != "force":
             terms.append(Term(form, (), free_of(bench, form)))
             continue
-        place, names, free = bench.places[form.index], [], []
+        free: list[Free] = []
+        place, names = bench.places[form.index], []
         for j, part in enumerate(form.parts):
             name = f"x{first}_{i}_{j}"
             own = {**({} if part.own else {part.gain[0]: (0.0, part.gain[1])}), **part.shapes}
-            parameters |= {f"{name}_{key}": entry for key, entry in own.items()}
+            parameters.update({f"{name}_{key}": entry for key, entry in own.items()})
             elements.append(element(name, place.ends, part))
             where.append(place)
             names.append(name)

@@ -185,7 +185,8 @@ def _beside(bench: Bench, place: int, motion: Motion, force: Array) -> Array:
     if names and driven and GROUND in ends and any(b.name in ends and not bench.model.parameters[b.mass].exact for b in bench.model.bodies):
         columns.append(np.concatenate([np.gradient(p.v, p.step) for p in motion.parts]))
     others = np.array([c / max(float(np.linalg.norm(c)), 1e-300) for c in columns]).T.reshape(len(force), -1)
-    return force - others @ np.linalg.lstsq(others, force, rcond=None)[0]
+    left: Array = force - others @ np.linalg.lstsq(others, force, rcond=None)[0]
+    return left
 
 
 def _lines(bench: Bench, place: int) -> list[str]:

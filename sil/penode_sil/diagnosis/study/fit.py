@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +32,25 @@ PROMISE = 0.7  # of the gain that a full step predicts: if that is reached, the 
 DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
 
 
+@dataclass(frozen=True, eq=False)
+class Series:
+    """What is added to an input: a signal [n] for each recording; of a hold also its period [s]."""
+
+    signals: Sequence[Array]
+    period: float = 0.0
+
+
+# a parameter's name, (what is wrong with it, input or sensor), (.., recording, state), (.., recording, parameter), or (.., input, series)
+Target = (
+    str | tuple[str, int] | tuple[Literal["start"], int, int] | tuple[Literal["own"], int, str] | tuple[Literal["input_added"], int, Series]
+)
+
+
 @dataclass(frozen=True)
 class Free:
-    """Something to be fitted. `target`: a parameter's name, or ("bias" | "skew", sensor index), ("start", recording, state index), or
-    ("own", recording, parameter). `unit` steps of it are natural; a `log` one stays positive. `sigma`: its prior."""
+    """Something to be fitted. `unit` steps of it are natural; a `log` one stays positive. `sigma`: its prior."""
 
-    target: str | tuple[str, int] | tuple[str, int, int] | tuple[str, int, str]
+    target: Target
     value: float
     unit: float
     log: bool = False
@@ -53,6 +67,13 @@ class Free:
     def of(self, what: str, recording: int) -> bool:
         """Is it a start state, or an own value, of a recording?"""
         return self.target[0] == what and self.target[1] == recording
+
+    def alone(self, recording: int) -> Free:
+        """As the only recording of a problem has it: start states of this one are those of 0, those of others are nobody's."""
+        match self.target:
+            case "start", own, state:
+                return replace(self, target=("start", 0 if own == recording else -1, state))
+        return self
 
     def at(self, shift: Array | float) -> Array:
         """Values after shifts by so many units."""
@@ -73,7 +94,7 @@ class Fit:
     jacobian: Array
     simulated: tuple[Array, ...]
 
-    def value(self, target: object) -> float:
+    def value(self, target: Target) -> float:
         return next(f.value for f in self.free if f.target == target)
 
     def covariance(self) -> Array:
@@ -170,12 +191,15 @@ class Problem:
         parameters, of_sensors = {}, []
         for f, shift in zip(free, shifts.T, strict=True):
             values = f.at(shift)
-            if isinstance(f.target, str) or f.of("own", e):
-                parameters[f.target if isinstance(f.target, str) else f.target[2]] = values
-            elif f.of("start", e):
-                start[:, f.target[2]] = values
-            elif f.target[0] not in ("start", "own"):  # of another recording
-                of_sensors.append((f.target[0], f.target[1], values))
+            match f.target:
+                case str(name):
+                    parameters[name] = values
+                case "own", recording, name if recording == e:
+                    parameters[name] = values
+                case "start", recording, state if recording == e:
+                    start[:, state] = values
+                case what, j:
+                    of_sensors.append((what, j, values))
         run = self.batch.run(self.inputs[e], x0=start, parameters=parameters, set_name=self.set_name, states=states, every=self.fine)
         z = run.z.transpose(1, 2, 0)  # [n, n_z, runs], as they lie in memory
         if self.moving and self.fine == 1 and len(z) > 4:

@@ -107,7 +107,8 @@ class Walk:
 
     def innovations(self, y: Array) -> Array:
         """White [n, sensors, any] if y is what the walk makes."""
-        return np.einsum("rs,ns...->nr...", self.root, y - np.einsum("sx,nx...->ns...", self.out, self.predictions(y)))
+        white: Array = np.einsum("rs,ns...->nr...", self.root, y - np.einsum("sx,nx...->ns...", self.out, self.predictions(y)))
+        return white
 
     def smoothed(self, y: Array) -> Array:
         """States [n, x] as they most likely were, by the innovations still to come: no covariance is inverted."""
@@ -128,7 +129,8 @@ def _riccati(f: Array, noise: Array, h: Array) -> Array:
         k = np.linalg.solve(h @ p @ h.T + np.eye(len(h)), h @ p).T
         rest = np.eye(len(f)) - k @ h
         p = f @ (rest @ p @ rest.T + k @ k.T) @ f.T + noise
-    return 0.5 * (p + p.T) * np.outer(size, size)
+    whole: Array = 0.5 * (p + p.T) * np.outer(size, size)
+    return whole
 
 
 def recursion(a: Array, drive: Array) -> Array:
@@ -239,7 +241,7 @@ class _Recording:
         )
         problem = Problem(acting or study.model, [driven], (), study.set_name, study.linear.fastest)
         moves = np.vstack([np.zeros(len(free)), EFFORT.shift * np.eye(len(free))])
-        z = problem.simulate(0, [replace(_of(f, k), low=-np.inf, high=np.inf) for f in free], moves)[0][:, :, list(own)] / sigma
+        z = problem.simulate(0, [replace(f.alone(k), low=-np.inf, high=np.inf) for f in free], moves)[0][:, :, list(own)] / sigma
         rest = e.y[:, list(own)] / sigma - z[0]
         at = np.arange(len(rest))
         for c, j in enumerate(own):
@@ -251,13 +253,6 @@ def _beside(columns: Array, more: Array) -> Array:
     return np.hstack([columns, more[:, None]])
 
 
-def _of(f: Free, k: int) -> Free:
-    """A free value as the only recording of a problem has it: start states of recording k are those of 0, those of others are nobody's."""
-    if isinstance(f.target, str) or f.target[0] != "start":
-        return f
-    return replace(f, target=("start", 0 if f.target[1] == k else -1, f.target[2]))
-
-
 def _at(
     place: Place, linear: Linear, column: int, free: tuple[Free, ...], parts: Sequence[_Recording], strengths: Sequence[float]
 ) -> _Found | None:
@@ -265,11 +260,12 @@ def _at(
     units = [_unit(linear, column, p) for p in parts]
 
     def walking(strength: float) -> list[Walk] | None:
-        walks = [_walk(linear, column, p, unit, strength) for p, unit in zip(parts, units, strict=True)]
-        return None if any(w is None for w in walks) else walks
+        walks = [w for p, unit in zip(parts, units, strict=True) if (w := _walk(linear, column, p, unit, strength))]
+        return walks if len(walks) == len(parts) else None
 
-    shift = next((_shifts(free, parts, walks) for s in reversed(EFFORT.strengths) if (walks := walking(s))), None)
-    found = [(_left(free, parts, walks, shift), float(s), walks) for s in strengths if shift is not None and (walks := walking(s))]
+    if (shift := next((_shifts(free, parts, walks) for s in reversed(EFFORT.strengths) if (walks := walking(s))), None)) is None:
+        return None
+    found = [(_left(free, parts, walks, shift), float(s), walks) for s in strengths if (walks := walking(s))]
     if not (found := [f for f in found if np.isfinite(f[0])]):
         return None
     left, strength, walks = min(found, key=lambda f: f[0])
@@ -325,7 +321,7 @@ def _limits(free: Sequence[Free]) -> tuple[Array, Array]:
 
 def _least(whole: Array, r: Array, down: Array, up: Array) -> Array:
     """Shifts within limits that leave least of r [rows] after whole [rows, free] (Stark and Parker 1995)."""
-    size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    size: Array = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
     scaled = whole / size
     root = np.linalg.cholesky(scaled.T @ scaled + 1e-12 * np.eye(len(size))).T
     reach = 1e-12  # limits must differ
@@ -339,7 +335,7 @@ def _fade(n: int) -> Array:
     """Weights [n, 1] of samples by which a stationary filter forgets and the plant stays what it is: the states of x' = f x, so weighted,
     are those of x' = c f x with c < 1, and noise is weighted by some percent. With c f and samples as they are, an angle of 10^6
     deviations of its sensor, held by no spring, would be off by 17 of them in each sample, and a force and damping found in it."""
-    return np.exp(-(np.arange(n)[:, None] - 0.5 * (n - 1)) / (EFFORT.forgets * n))
+    return np.exp(-(np.arange(0.0, n)[:, None] - 0.5 * (n - 1)) / (EFFORT.forgets * n))
 
 
 def _innovations(parts: Sequence[_Recording], walks: Sequence[Walk], of: Callable[[_Recording], Array]) -> list[Array]:

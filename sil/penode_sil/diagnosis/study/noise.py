@@ -172,7 +172,8 @@ def _smoothed(power: Array, bin: float) -> Array:
     half = np.maximum(int(0.5 / bin), np.arange(n) // 6) + 1
     low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)
     total = np.concatenate([[0.0], np.cumsum(power)])
-    return (total[high] - total[low]) / (high - low)
+    means: Array = (total[high] - total[low]) / (high - low)
+    return means
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +212,8 @@ class Metric:
     @property
     def power(self) -> Array:
         """Variance of noise in each spectrum [f, sensors]."""
-        return np.sum(np.abs(np.linalg.inv(self.root)) ** 2, axis=-1)
+        power: Array = np.sum(np.abs(np.linalg.inv(self.root)) ** 2, axis=-1)
+        return power
 
     @property
     def volume(self) -> float:
@@ -251,8 +253,8 @@ class Thinning:
             here[:] = part.reshape(-1, columns)[: here.shape[1]].T
         spectra = np.empty((columns, len(self.gain)), dtype=complex)
         for k in range(0, columns, TOGETHER):
-            some = slice(k, k + TOGETHER)
-            np.divide(fft.rfft(rows[some], axis=1)[:, : len(self.gain)], self.gain, out=spectra[some])
+            few = slice(k, k + TOGETHER)
+            np.divide(fft.rfft(rows[few], axis=1)[:, : len(self.gain)], self.gain, out=spectra[few])
         return spectra.reshape(*signals.shape[1:], -1)
 
     def rates(self, signals: Array, spectra: NDArray[np.complex128], step: float) -> NDArray[np.complex128]:
@@ -260,7 +262,8 @@ class Thinning:
         turn = 2.0 * np.pi / self.n * np.arange(len(self.gain))
         first, second, before, last = signals[0], signals[1], signals[-2], signals[-1]
         ends = (0.5 * (second + last) - first)[:, None] + (last - 0.5 * (first + before))[:, None] * np.exp(1j * turn)
-        return (1j * np.sin(turn) * spectra + ends) / step
+        rates: NDArray[np.complex128] = (1j * np.sin(turn) * spectra + ends) / step
+        return rates
 
 
 @cache
@@ -341,7 +344,7 @@ def _slow(n: int, band: int, wide: int) -> tuple[Array, Array]:
     return shapes, np.add.reduceat(shapes, edges, axis=1) / np.diff(np.append(edges, band))
 
 
-def metric(e: Experiment, levels: Array, through: NDArray[np.complex128]) -> Metric:
+def metric(e: Experiment, levels: Array, through: Array | NDArray[np.complex128]) -> Metric:
     """The metric of a recording: levels [f, sensors] and the transfer [f, sensors, inputs] of the inputs' noise."""
     g = through[: e.band] * e.unsure[: e.band, None, :] * np.sqrt(e.duty)[None, :, None]
     s = g @ np.conj(np.swapaxes(g, 1, 2)) + levels[:, :, None] * np.eye(levels.shape[1])

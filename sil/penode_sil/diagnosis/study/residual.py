@@ -240,7 +240,8 @@ def noise_rms(study: Study) -> Array:
     """
     e, level = study.experiments[0], study.levels[0]
     beyond = np.where(np.isfinite(e.quiet), e.quiet, level[-1])[e.band :]
-    return np.sqrt(np.mean(np.concatenate([level, beyond]), axis=0) + driven(study))
+    power: Array = np.mean(np.concatenate([level, beyond]), axis=0) + driven(study)
+    return np.sqrt(power)
 
 
 def stated_noise(study: Study) -> Array:
@@ -253,7 +254,8 @@ def driven(study: Study) -> Array:
     """Mean power [n_z] that noise of the inputs has in the sensors."""
     e = study.experiments[0]
     through = study.linear.transfer(e.frequencies)[:, : len(study.model.sensors), : len(study.model.inputs)]
-    return np.mean(np.sum(np.abs(through * np.array([i.noise for i in study.model.inputs])) ** 2, axis=2), axis=0)
+    power: Array = np.mean(np.sum(np.abs(through * np.array([i.noise for i in study.model.inputs])) ** 2, axis=2), axis=0)
+    return power
 
 
 # -- numbers ----------------------------------------------------------------------------------------------------------

@@ -120,7 +120,7 @@ def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surf
     for i, place in enumerate(places):
         s, v = (np.concatenate([m[q][:, i] for m in motions])[inner] for q in (0, 1))
         forces = [np.concatenate([z[:, i] for z in each])[inner] for each in both]
-        edges = tuple(np.linspace(*_ends(q), BINS + 1) for q in (s, v))
+        edges = np.linspace(*_ends(s), BINS + 1), np.linspace(*_ends(v), BINS + 1)
         measured = forces[1] + np.concatenate([w[:, i] for w in beside])[inner]
         names = tuple(name for name, _ in place.elements)
         new = forces[2] if extended else None

@@ -80,4 +80,5 @@ def likely(e: Experiment, levels: Array, g: Complex, acting: int, r: Complex) ->
             power = np.abs(root * (inner @ (root * slope)[:, :, None])[:, :, 0]) ** 2 + np.maximum(left, 0.0)
             for q in range(acting):
                 prior[:, q] = np.maximum(np.convolve(power[:, q], kernel, "same") / weight, 1e-30)
-    return root[:, :, None] * inner * root[:, None, :] @ weighted
+    gain: Complex = root[:, :, None] * inner * root[:, None, :] @ weighted
+    return gain

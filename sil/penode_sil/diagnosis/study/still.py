@@ -29,7 +29,7 @@ def with_noise_at_rest(model: Model, paths: Iterable[Path], channels: Iterable[s
     about a straight line, for what drifts is no noise. Channels that are not there, or do not change (a resolution too coarse to show
     noise), keep what the model file states. UserError for a recording without any channel of the model, or in which something moves."""
     paths = list(paths)
-    pairs = aliases(channels, [s.name for s in (*model.inputs, *model.sensors, *model.outputs)])
+    pairs = aliases(channels, [*(i.name for i in model.inputs), *(s.name for s in (*model.sensors, *model.outputs))])
     found: dict[str, list[float]] = {}
     problems: list[str] = []
     for path in paths:
@@ -49,7 +49,7 @@ def with_noise_at_rest(model: Model, paths: Iterable[Path], channels: Iterable[s
 
 def _of(path: Path, model: Model, pairs: dict[str, str], train: Sequence[Measured]) -> dict[str, float]:
     """Noise of each channel of a recording that changes."""
-    signals = {s.name: s for s in (*model.inputs, *model.sensors)}
+    signals: dict[str, Signal | Input] = {**{i.name: i for i in model.inputs}, **{s.name: s for s in model.sensors}}
     tables = read(path, [*signals, "time"], pairs)
     held = [s for s in signals.values() if any(t.find(s.name, s.unit) for t in tables)]
     if not held:

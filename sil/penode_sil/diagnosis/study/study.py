@@ -121,14 +121,14 @@ def null_study(model: Model, experiments: Sequence[Experiment], set_name: str = 
         problem = Problem(model, experiments, metrics, set_name)
         free = fit.free
         if guessed(model):  # what the file says is no point to linearise about
-            linear = plant.linearise(fitted(model, fit), found, np.array(x[0][pick]), experiments[0].u[pick])
+            linear = plant.linearise(fitted(model, fit.free), found, np.array(x[0][pick]), experiments[0].u[pick])
     fit = problem.solve(free)
     return Study(model, set_name, experiments, found, linear, tuple(levels), tuple(metrics), fit)
 
 
-def fitted(model: Model, fit: Fit) -> Model:
-    """The model with the parameters of a fit."""
-    values = {f.target: f.value for f in fit.free if isinstance(f.target, str)}
+def fitted(model: Model, free: Sequence[Free]) -> Model:
+    """The model with the parameters as they are fitted."""
+    values = {f.target: f.value for f in free if isinstance(f.target, str)}
     changed = {name: replace(p, value=values[name]) for name, p in model.parameters.items() if name in values}
     return replace(model, parameters={**model.parameters, **changed})
 
