@@ -500,6 +500,10 @@ def test_extends(folder):
     assert (model.name, model.parameters["k"].value, model.sample_time) == ("better", 70.0, 1e-3)
     assert model.sets.keys() == base.sets.keys() and model.digest != base.digest
     assert base.digest == penode_gen.load(folder / "good.toml").digest
+    model = penode_gen.load(write('[parameters]\ndamp_damping = { value = 4, unit = "N*s/m" }'))  # a quantity in an element, "3 N*s/m"
+    assert model.parameters["damp_damping"].value == 4.0
+    other = problems(write('[parameters]\ndamp_damping = { value = 4, unit = "N" }'))
+    assert "good.toml:25: elements.damp.damping: this quantity would become the parameter 'damp_damping', which there is" in other[0]
 
     assert "extended.toml:5: parameters.k.valu" in problems(write('[parameters]\nk = { valu = 70, unit = "N/m" }'))[0]
     (folder / "good.toml").write_text(GOOD.replace("start = 0.5", "strat = 0.5"))

@@ -173,7 +173,7 @@ def test_what_is_wrong_with_one_input_stands_in_a_row(tmp_path):
     ]
     assert [x.split(" = ")[0] for x in found.parameters] == ["tau_gain", "tau_offset_2"]
     assert found.through(seen.expression) == "phi + 0.1*(tau_acts_3 + tau_offset_2) + 0.01*der(tau_acts_3)"
-    (motor,) = applied.redirected(model, found)["elements"]
+    (motor,) = applied.redirected(model, found, {})["elements"]
     assert motor.startswith("motor = ") and '"-(tau_acts_3 + tau_offset_2)"' in motor
 
 

@@ -27,7 +27,8 @@ class EndTables(NetworkTables):
     kinds: dict[str, str]  # what elements may act on -> its unit, "m" or "rad"
 
     def argument(self, where: tuple[str, ...], key: str, text: str, unit: str, new: str, parameters: dict[str, m.Parameter]) -> str:
-        """Name of the parameter that `text` names, or of a new one made from a quantity such as '35 N'."""
+        """Name of the parameter that `text` names, or of a new one made from a quantity such as '35 N', which a file that extends this one
+        may give another value."""
         where = (*where, key)
         if NAME.fullmatch(text):
             if text not in parameters:
@@ -41,7 +42,9 @@ class EndTables(NetworkTables):
                 self.problem(where, f"'{text}' is in {parameters[text].unit}, needed is {unit}", "use a parameter of that unit")
             return text
         value = self.quantity(where, text, unit)
-        if new in parameters:
+        if new in parameters and self.extended(("parameters", new), where) and same(parameters[new].unit, unit):
+            pass
+        elif new in parameters:
             self.problem(where, f"this quantity would become the parameter '{new}', which there is already", "name that one, or rename it")
         else:
             parameters[new] = m.Parameter(new, value, unit, description=f"{key} of {where[1]}")

@@ -113,6 +113,11 @@ class Tables:
         """The file that has this key."""
         return next(((p, la) for p, la in self.places if la.knows(where)), self.places[0])
 
+    def extended(self, where: tuple[str, ...], base: tuple[str, ...]) -> bool:
+        """Is a key in a file that extends the one with the key `base`?"""
+        files = [path for path, _ in self.places]
+        return files.index(self.place(where)[0]) < files.index(self.place(base)[0])
+
     def problem(self, where: Iterable[str], what: str, remedy: str) -> None:
         where = tuple(where)
         path, lines = self.place(where)

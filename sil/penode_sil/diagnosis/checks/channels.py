@@ -191,7 +191,7 @@ def _sections(model: Model, found: Sequence[Mix]) -> dict[str, list[str]]:
             shown[names[0]] = (f"-({shown[names[0]][0]})", shown[names[0]][1])
         else:
             shown[names[0]], shown[names[1]] = shown[names[1]], shown[names[0]]
-    moved = applied.redirected(model, driven)
+    moved = applied.redirected(model, driven, {})
     sensors, outputs = [], {o.split(" = ")[0]: o for o in moved["outputs"]}
     for s in model.sensors:
         expression, noise = shown[s.name]
@@ -199,7 +199,7 @@ def _sections(model: Model, found: Sequence[Mix]) -> dict[str, list[str]]:
             sensors.append(f"{s.name} = {table({'value': text, 'unit': s.unit, 'noise': noise / units.factor(s.unit)})}")
             outputs |= {o.name: f"{o.name} = {table({'value': text, 'unit': o.unit})}" for o in model.outputs if o.name == s.name}
     return {
-        "parameters": driven.parameters,
+        "parameters": [*driven.parameters, *moved["parameters"]],
         "actuators": driven.actuators,
         "elements": moved["elements"],
         "equations": moved["equations"],

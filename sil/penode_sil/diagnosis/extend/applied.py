@@ -48,7 +48,8 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     values = fit.values
     parameters, elements = _forces(model, bench, values, forces, named)
     driven = _driven(model, fit, terms, {*taken, *rename.values()})
-    moved = redirected(model, driven)
+    moved = redirected(model, driven, values)
+    parameters += [p for p in moved["parameters"] if p not in parameters]
     own = [(e, bench.places[t.form.index]) for t in forces for e in bench.model.elements if e.name in t.elements]
     grown = extend(model, [e for e, _ in own], {}, [place for _, place in own])
     limits = {t.form.index: [fit.value(f.target) for f in t.free] for t in terms if t.form.how == "clip"}
@@ -275,15 +276,18 @@ def _uncorrected(t: Term) -> str:
     return f"{t.form.how} of {t.form.where}: a recording has to be corrected, the model file has no law for it"
 
 
-def redirected(model: Model, driven: Driven) -> dict[str, list[str]]:
-    """Elements, equations and outputs on which inputs act, with the expressions that replace these."""
-    found: dict[str, list[str]] = {"elements": [], "equations": [], "outputs": []}
+def redirected(model: Model, driven: Driven, values: Mapping[str, float]) -> dict[str, list[str]]:
+    """Elements, equations and outputs on which inputs act, with the expressions that replace these; and the parameters, with fitted
+    `values`, that quantities in these elements become."""
+    found: dict[str, list[str]] = {"parameters": [], "elements": [], "equations": [], "outputs": []}
     for e in model.elements:
         ends = driven.acts.get(e.ends[0], e.ends[0]), driven.acts.get(e.ends[1], e.ends[1])
         text = driven.through(e.expression)
         if ends != e.ends or text != e.expression:
             entry = _element(Element(e.name, ends, e.law, e.arguments, e.network, e.network_inputs, text), lambda x: x)
             found["elements"].append(f"{e.name} = {table(entry)}")
+            own = [name for key, name in e.arguments.items() if name == f"{e.name}_{key}"]  # they may be quantities in the file's element
+            found["parameters"] += [_changed(model, name, values.get(name, model.parameters[name].value)) for name in own]
     for q in model.equations:
         if (text := driven.through(q.text)) != q.text:
             found["equations"].append(f"{q.name} = {toml(text)}")
