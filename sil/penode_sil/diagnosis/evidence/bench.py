@@ -148,6 +148,7 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
     """The bench with the update and the forces that its motion asks for, and the states [n, n_x] that follow the measurement."""
     n_q, fastest = len(model.bodies), bench.fastest
     x: list[Array] = []
+    followed: tuple[Bench, list[Array]] | None = None
     for again in range(3):
         scale = bench.forces if again else _guess(bench, model, spans)
         x = _followed(replace(bench, forces=scale))
@@ -163,8 +164,9 @@ def _moved(bench: Bench, model: Model, spans: Array) -> tuple[Bench, list[Array]
         rates = np.concatenate([s[:, n_q : 2 * n_q] for s in x])
         slopes = np.concatenate([np.gradient(smooth(s[:, n_q : 2 * n_q], bench.update), bench.step, axis=0) for s in x])
         v, a = (np.sqrt(np.mean(r**2, axis=0)) for r in (rates, slopes))
-        if not (np.isfinite(v).all() and np.all(a < FAR * scale)):  # it does not follow: what was guessed has to do
-            return replace(bench, forces=scale), [np.where(np.abs(s) < np.inf, s, 0.0) for s in x]
+        if not (np.isfinite(v).all() and np.all(a < FAR * scale)):  # it does not follow: what did, or was guessed, has to do
+            return followed or (replace(bench, forces=scale), [np.where(np.abs(s) < np.inf, s, 0.0) for s in x])
+        followed = replace(bench, forces=scale), x
         period = float(np.min(2.0 * np.pi * v / np.maximum(a, 1e-300)))
         bench = replace(
             bench, forces=np.maximum(a, 1e-12), update=_update(bench, period), fastest=max(fastest, MAX_TURN * UPDATES * MIN_STEPS / period)

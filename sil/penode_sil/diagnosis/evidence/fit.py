@@ -79,8 +79,15 @@ class Fit:
         likelihood, priors, and the width of the posterior against theirs."""
         prior = np.array([(1.0 if f.log else f.unit) / f.sigma for f in self.free])
         own = prior > 0.0  # what has no prior is free in all fits
-        volume: float = np.linalg.slogdet(self.curvature())[1]
-        return self.likelihood - sum(map(cost, self.free)) + float(np.sum(np.log(prior[own]))) - 0.5 * volume
+        return self.likelihood - sum(map(cost, self.free)) + float(np.sum(np.log(prior[own]))) - 0.5 * _log_determinant(self.curvature())
+
+
+def _log_determinant(c: Array) -> float:
+    """Of a curvature, each of its values in units of its own deviation first: where a neighbour of a fit diverges, slopes of 1e20 stand
+    beside others, and the plain determinant rounds to 0, an infinite gain."""
+    size = np.sqrt(np.maximum(np.diag(c), 1e-300))
+    lengths = np.maximum(np.linalg.eigvalsh(c / np.outer(size, size)), 1e-12)
+    return float(2.0 * np.sum(np.log(size)) + np.sum(np.log(lengths)))
 
 
 def likelihood(nu: Array, used: NDArray[np.bool_], floor: Array) -> tuple[Array, float]:
