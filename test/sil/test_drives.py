@@ -211,7 +211,7 @@ def test_what_a_small_form_hides():
     """A force of 20 % of the force elsewhere is looked at again once a small form is in the model, however little it takes before."""
 
     def trial(where, share, taken):
-        return Trial(_form("k", where), None, None, 50.0, None, share, taken)
+        return Trial(_form("k", where), None, None, 50.0, None, None, share, taken)
 
     small = trial("shaft", 0.03, 0.4)
     assert rounds._hidden(trial("bearing", 0.2, 0.1), small)

@@ -21,7 +21,17 @@ from penode_sil.diagnosis.study.fit import Free
 
 def trial(kind: str, nats: float) -> Trial:
     form = Form(kind, "drive", "force", 0, ())
-    return Trial(form, Term(form, (), (Free(kind, 1.0, 1.0),)), None, 1.0, None, share=1.0, taken=1.0, blocks=np.full(4, nats / 4.0))
+    return Trial(
+        form,
+        Term(form, (), (Free(kind, 1.0, 1.0),)),
+        SimpleNamespace(free=()),
+        1.0,
+        None,
+        None,
+        share=1.0,
+        taken=1.0,
+        blocks=np.full(4, nats / 4.0),
+    )
 
 
 def bench(*kinds: str, level: float = 0.0) -> Any:
@@ -44,8 +54,8 @@ def found(monkeypatch: pytest.MonkeyPatch):
 
         monkeypatch.setattr(Rounds, "good", good)
         monkeypatch.setattr(Rounds, "beside", beside)
-        monkeypatch.setattr(rounds, "propose", lambda at, terms, log, stiffer: ([lag], None))
-        monkeypatch.setattr(rounds, "scored", lambda at, problem, blocks, t: t)
+        monkeypatch.setattr(rounds, "propose", lambda at, terms, log, stiffer: [lag])
+        monkeypatch.setattr(rounds, "scored", lambda at, blocks, t: t)
         monkeypatch.setattr(rounds, "adopt", lambda at, t, number: (bench(*at.kinds, t.form.kind, level=level), [t.term]))
         monkeypatch.setattr(rounds, "_based", lambda at, blocks: (at, np.full(4, -10.0)))
         start.problem = lambda wide: None

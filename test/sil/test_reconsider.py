@@ -15,8 +15,7 @@ import pytest
 from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence.gain import Level
 from penode_sil.diagnosis.search import rounds
-from penode_sil.diagnosis.search.innovate import _own_names
-from penode_sil.diagnosis.search.reconsider import reconsidered
+from penode_sil.diagnosis.search.reconsider import needed, reconsidered
 from penode_sil.diagnosis.search.rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, _is_sure, simplest
 from penode_sil.diagnosis.search.terms import Term, Trial
 from penode_sil.diagnosis.search.worth import WORTH
@@ -42,7 +41,7 @@ def trial(name: str, nats: float, whole: float = 0.0) -> Trial:
     )
     form = Form(NAMES[name], "spring", "force", 0, parts)
     free = tuple(Free(f"{name}_{k}", 1.0, 1.0) for k in range(VALUES.get(name, 1)))
-    return Trial(form, Term(form, (), free), None, 0.0, None, whole=whole, blocks=np.full(4, nats / 4.0))
+    return Trial(form, Term(form, (), free), SimpleNamespace(free=()), 0.0, None, None, whole=whole, blocks=np.full(4, nats / 4.0))
 
 
 def accepted(number: int, t: Trial, trials: Sequence[Trial] = ()) -> Accepted:
@@ -248,7 +247,7 @@ def test_a_constant_beside_a_friction_is_left_for_a_law_that_pulls_to_one_side()
 
 def gained(kind: str, where: str, index: int, gain: float) -> Accepted:
     form = Form(kind, where, "force", index)
-    return Accepted(Trial(form, Term(form, (), ()), None, gain, None), index, (), ())
+    return Accepted(Trial(form, Term(form, (), ()), None, gain, None, None), index, (), ())
 
 
 @pytest.mark.parametrize("share, named", [(0.9, False), (1.1, True)])
@@ -257,14 +256,47 @@ def test_a_form_that_makes_up_for_the_curve_of_another_at_its_place_has_no_name(
     nothing."""
     forms = [gained("degressive_damper", "damper", 0, 1000.0), gained("cubic_spring", "spring", 0, share * MIN_FORM * 1000.0)]
     forms += [gained("coulomb_friction", "rail", 1, 0.1 * MIN_FORM * 1000.0), gained("bump_stop", "rail", 1, 500.0)]
-    end = Grown(None, np.zeros(4), tuple(forms), (True, True, True, False), ())
-    assert _own_names(end) == [True, named, True, False]
+    end = Grown(None, summed(forms), tuple(forms), (True, True, True, False), ())
+    assert needed(Summed(summed), end) == [True, named, True, False]
+
+
+def summed(forms: Sequence[Accepted]) -> np.ndarray:
+    """Scores of forms that gain the same in any company."""
+    return np.full(4, sum(a.trial.gain for a in forms) / 4.0)
+
+
+@dataclass
+class Summed:
+    """Stands for Rounds where scores are a function of the accepted forms."""
+
+    scores: Callable[[Sequence[Accepted]], np.ndarray]
+
+    def beside(self, forms: Sequence[Accepted]) -> tuple[None, np.ndarray, Sequence[Accepted]]:
+        return None, self.scores(forms), forms
+
+    def log(self, text: str) -> None:
+        pass
+
+
+def test_a_form_that_later_ones_have_made_superfluous_has_no_name():
+    """It gained most when it was accepted, and gains 100 of 1000 beside the one that was accepted last; of two that stand for each other,
+    one keeps its name."""
+    first, last = gained("maxwell_bushing", "spring", 0, 3000.0), gained("stribeck_friction", "damper", 0, 4000.0)
+    twin = gained("bouc_wen", "damper", 0, 2000.0)
+
+    def scores(forms: Sequence[Accepted]) -> np.ndarray:
+        return np.full(4, (1000.0 * (last in forms or twin in forms) + 100.0 * (first in forms)) / 4.0)
+
+    end = Grown(None, scores([first, last]), (first, last), (True, True), ())
+    assert needed(Summed(scores), end) == [False, True]
+    end = Grown(None, scores([twin, last]), (twin, last), (True, True), ())
+    assert sorted(needed(Summed(scores), end)) == [False, True]
 
 
 def friction(kind: str, laws: Sequence[str], nats: float, level: float) -> Trial:
     form = Form(kind, "rail", "force", 0, tuple(Part(law, ("force", "N")) for law in laws))
     free = tuple(Free(f"{kind}_{law}", 1.0, 1.0) for law in laws)
-    return Trial(form, Term(form, (), free), None, nats, Level(level, 1.0), blocks=np.full(4, nats / 4.0))
+    return Trial(form, Term(form, (), free), SimpleNamespace(free=()), nats, Level(level, 1.0), None, blocks=np.full(4, nats / 4.0))
 
 
 NESTED, OTHER = ("coulomb_friction", "peak"), ("bouc_wen", "peak")

@@ -31,6 +31,8 @@ PARAMETERS = {  # what each number of a report means
         "knee": "rate of the bend",
         "low_rate_damping": "slope of the whole damper below the knee",
         "high_rate_damping": "slope of the whole damper above the knee",
+        "coefficient": "extra force coefficient v abs(v)",
+        "force_at_reach": "extra force at the greatest rate",
     },
     "quadratic_damper": {"coefficient": "extra force coefficient v abs(v)", "force_at_reach": "extra force at the greatest rate"},
     "damper_fading": {"loss": "share of the damping that is lost at the end of the first training recording"},
@@ -49,6 +51,7 @@ RIVALS = {
     ("damper_fading", "degressive_damper"): "the same excitation at the start and at the end of one recording, at two amplitudes",
 }
 STRAIGHT = ("asymmetric_damper", "degressive_damper")
+FALLING = "with the square of the rate"
 WORKS = (0.25, 25.0)  # of the work of the rms rate in a recording: heat that warms a damper as far as it gets
 KNEES = (0.3, 1.0)  # of the rms rate; fitted down to friction.WIDEST, where the transition of a friction ends
 
@@ -65,8 +68,9 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     for share in KNEES:
         bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1, span=share / friction.WIDEST)
         yield Form(KINDS[1], place.loss, "force", index, (bent,))
-    yield Form(KINDS[2], place.loss, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2")),))
-    yield Form(KINDS[2], place.loss, "force", index, (powers.odd("v", (motion.v_reach, "m/s"), 2.5),), powers.NOTE)
+    for kind, sign, note in ((KINDS[2], 1, ""), (KINDS[1], -1, FALLING)):
+        yield Form(kind, place.loss, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, sign),), note)
+        yield Form(kind, place.loss, "force", index, (powers.odd("v", (motion.v_reach, "m/s"), 2.5, sign),), powers.NOTE)
     for part in _fading(motion):
         yield Form(KINDS[3], place.loss, "force", index, (part,))
 
@@ -88,6 +92,8 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     own = v.nominal("linear_damper", "damping")
     if form.note == powers.NOTE:
         return {"force_at_reach": ("N", v(0, "force"))}
+    if form.note == FALLING:
+        return {"coefficient": ("N*s^2/m^2", v(0, "coefficient"))}
     match form.kind:
         case "asymmetric_damper" if form.note:
             return {"quadratic": ("N*s^2/m^2", v(0, "quadratic"))}

@@ -18,7 +18,7 @@ def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
     trial's values for parameters that the bench has, and ignores the others. `number` makes the form's parameter names the same in every
     bench."""
     moved = motions(Probe.of(bench))
-    wide, (term,) = with_forms(bench, [t.form], moved, 90 + number)  # forms that are only tried have the number of their round, far below
+    model, (term,) = with_forms(bench, [t.form], moved, 90 + number)  # forms that are only tried have the number of their round, far below
     names = dict(zip([f.target for f in t.term.free], term.free, strict=True))
     own = {f.target: f for f in bench.fit.free}
     fitted = [
@@ -28,9 +28,9 @@ def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
         *fitted,
         *(f for f in own.values() if f.target not in {x.target for x in fitted}),
     )  # the bench may have parameters that the trial did not fit
-    fresh = replace(bench, model=wide, free=free, level=t.level)
+    fresh = replace(bench, model=model, free=free, level=t.level)
     problem = fresh.problem()
-    fresh = replace(fresh, fit=problem.solve(free, t.fit.by.cut(len(bench.model.states)).padded(len(wide.states)), FOLLOWED))
+    fresh = replace(fresh, fit=problem.solve(free, t.fit.by.cut(len(bench.model.states)).padded(len(model.states)), FOLLOWED))
     return steepened(fresh, term), apart(term)
 
 

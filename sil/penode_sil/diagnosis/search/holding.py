@@ -21,8 +21,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen.model import Model
-
 from ..catalogue.form import Form
 from ..evidence.bench import AGAIN, CORRELATION, Bench, fit_level
 from ..evidence.blocks import Blocks
@@ -62,24 +60,24 @@ def propose(bench: Bench, index: int, delay: float) -> Form | None:
     return Form(KIND, bench.model.inputs[index].name, "input_added", index, series=_likeliest(_finer(bench, about), index, about))
 
 
-def told_apart(bench: Bench, model: Model, trials: Sequence[Trial]) -> list[Trial]:
-    """The trials of a round (`model` contains all of them), with each hold scored against the delay of the same input at an update rate
+def told_apart(bench: Bench, trials: Sequence[Trial]) -> list[Trial]:
+    """The trials of a round, with each hold scored against the delay of the same input at an update rate
     that resolves its steps. Other trials keep their scores: interpolating between the samples of a late sensor lowers its noise, which
     would bias the comparison."""
     delays = {t.form.index: t for t in trials if t.form.how == "input_delay"}
-    return [_against(bench, model, t, delays[t.form.index]) if t.form.kind == KIND and t.form.index in delays else t for t in trials]
+    return [_against(bench, t, delays[t.form.index]) if t.form.kind == KIND and t.form.index in delays else t for t in trials]
 
 
-def _against(bench: Bench, model: Model, hold: Trial, delay: Trial) -> Trial:
+def _against(bench: Bench, hold: Trial, delay: Trial) -> Trial:
     """A hold with the scores of a delay, and what it predicts better with updates that resolve its steps."""
     fine = _finer(bench, hold.form.series.period / bench.step) if hold.form.series else bench
     if fine is bench:
         return hold
-    blocks, problem = Blocks.of([len(r) // fine.update for r in fine.records]), fine.problem(model)
+    blocks, problem = Blocks.of([len(r) // fine.update for r in fine.records]), fine.problem()
 
     def scores(t: Trial) -> Array:
-        fit = problem.solve(t.fit.free, fine.gains(fine.fit, model).at(fine.level), AGAIN)
-        return blocks.scores(problem, fit_level(replace(fine, model=model), problem, fit, fine.level)[1])
+        fit = problem.solve(t.fit.free, fine.gains(fine.fit).at(fine.level), AGAIN)
+        return blocks.scores(problem, fit_level(fine, problem, fit, fine.level)[1])
 
     relief = stated(delay.fit.free) - stated(hold.fit.free)
     return replace(hold, blocks=delay.blocks + scores(hold) - scores(delay) + relief / len(delay.blocks))

@@ -14,7 +14,7 @@ from ..evidence.blocks import BLOCKS, Blocks
 from ..evidence.fit import Fit
 from ..evidence.observer import Filter, bias
 from .propose import FREE_RUN
-from .reconsider import centred, reconsidered
+from .reconsider import centred, needed, reconsidered
 from .rounds import LEVEL_FACTORS, MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, is_large, name_of, terms_of
 from .terms import Term, Trial
 from .worth import RATIO, Z_95, least, mostly, remaining
@@ -73,15 +73,7 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
     level = remaining(after, run, np.array([s.noise for s in bench.model.sensors]))
     log(f"what remains: {level:.3g} of all forces")
     end = _run_free(end, level, log)
-    return _found(rounds, end, _own_names(end), run, level)
-
-
-def _own_names(end: Grown) -> list[bool]:
-    """Which forms have a name: the large ones, but for one that gains less than MIN_FORM of what another does at its place, input or
-    sensor: the curve of that is not its textbook form, and the small one makes up for the difference."""
-    large = [a.trial for a, big in zip(end.accepted, end.large, strict=True) if big]
-    most = {t.form.at: max(o.gain for o in large if o.form.at == t.form.at) for t in large}
-    return [big and a.trial.gain >= MIN_FORM * most[a.trial.form.at] for a, big in zip(end.accepted, end.large, strict=True)]
+    return _found(rounds, end, needed(rounds, end), run, level)
 
 
 def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:

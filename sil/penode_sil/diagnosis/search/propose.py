@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from penode_gen.model import GROUND, Model
+from penode_gen.model import GROUND
 
 from .. import catalogue
 from ..catalogue import drives, friction
@@ -55,9 +55,9 @@ def _inertia(bench: Bench, body: str) -> float:
     return bench.fit.values.get(b.mass, bench.model.parameters[b.mass].value) * float(bench.forces[k])
 
 
-def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None], stiffer: float = 1.0) -> tuple[list[Trial], Model]:
-    """The likeliest forms beside those accepted, fitted, the best first; and the model that has all of them. They are looked for by an
-    observer for `stiffer` times less unmodelled force than the bench has, and compared with the bench as it is."""
+def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None], stiffer: float = 1.0) -> list[Trial]:
+    """The likeliest forms beside those accepted, fitted, the best first. They are looked for by an observer for `stiffer` times less
+    unmodelled force than the bench has, and compared with the bench as it is."""
     base, bench = bench.fit, _corrected_less(bench, stiffer)
     probe = Probe.of(bench)
     moved = motions(probe)
@@ -79,12 +79,11 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None], sti
     actuators = [pair for j in moving for pair in _bent(bench, j, terms)]
     ranked = sorted([*ranked, *limits, *actuators], key=lambda pair: -pair[0].gain)
     chosen = _chosen(ranked)
-    wide, made = with_forms(bench, [form for _, form in chosen], moved, len(terms))
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
-    trials = [_fitted(bench, base, wide, moved, terms, t, s.sizes) for t, (s, _) in zip(made, chosen, strict=True)]
-    trials += [_fitted(bench, base, wide, moved, terms, t, np.ones(1)) for t in _holds(bench, trials, terms)]
+    trials = [_fitted(bench, base, form, moved, terms, s.sizes) for s, form in chosen]
+    trials += [_fitted(bench, base, form, moved, terms, np.ones(1)) for form in _holds(bench, trials, terms)]
     trials += _of_all(bench, base, trials, moved, terms)
-    return sorted(trials, key=lambda t: -t.gain), wide
+    return sorted(trials, key=lambda t: -t.gain)
 
 
 def _corrected_less(bench: Bench, stiffer: float) -> Bench:
@@ -170,13 +169,13 @@ def _moved_gain(bench: Bench, form: Form) -> float:
     return max(fit.likelihood - bench.fit.likelihood, 0.0)
 
 
-def _holds(bench: Bench, trials: Sequence[Trial], terms: Sequence[Term]) -> list[Term]:
-    """Hold terms for inputs of which a delay gained at least half as much as the best trial: the delay is the main effect of a hold."""
+def _holds(bench: Bench, trials: Sequence[Trial], terms: Sequence[Term]) -> list[Form]:
+    """Holds of inputs of which a delay gained at least half as much as the best trial: the delay is the main effect of a hold."""
     taken = [t.form.where for t in terms if t.form.kind == holding.KIND]
     most = max((t.gain for t in trials), default=0.0)
     late = [t for t in trials if t.form.how == "input_delay" and t.form.where not in taken and t.gain > max(0.5 * most, PROMISE)]
     found = [holding.propose(bench, t.form.index, t.fit.value(t.term.free[0].target)) for t in late]
-    return [Term(form, (), free_of(bench, form)) for form in found if form]
+    return [form for form in found if form]
 
 
 def _of_all(bench: Bench, base: Fit, trials: Sequence[Trial], moved: Sequence[Motion], terms: Sequence[Term]) -> list[Trial]:
@@ -191,9 +190,8 @@ def _of_all(bench: Bench, base: Fit, trials: Sequence[Trial], moved: Sequence[Mo
 
 
 def as_it_is(bench: Bench, base: Fit, form: Form, moved: Sequence[Motion], terms: Sequence[Term]) -> Trial:
-    """A form fitted from its own values on, beside the terms accepted, in a model of its own."""
-    model, (term,) = with_forms(bench, [form], moved, len(terms))
-    return replace(_fitted(bench, base, model, moved, terms, term, np.zeros(len(term.free))), model=model)
+    """A form fitted from its own values on, beside the terms accepted."""
+    return _fitted(bench, base, form, moved, terms)
 
 
 def _slope(bench: Bench, form: Form) -> Array:
@@ -208,12 +206,14 @@ def _slope(bench: Bench, form: Form) -> Array:
     return slope
 
 
-def _fitted(bench: Bench, base: Fit, wide: Model, moved: Sequence[Motion], terms: Sequence[Term], term: Term, sizes: Array) -> Trial:
-    """Fits a term beside those accepted, from the best fit so far with the sizes that its score promises; its gain is that over `base`.
+def _fitted(bench: Bench, base: Fit, form: Form, moved: Sequence[Motion], terms: Sequence[Term], promised: Array | None = None) -> Trial:
+    """Fits a form beside those accepted, from the best fit so far with the sizes `promised` by its score; its gain is that over `base`.
+    Its model has no other form that is tried: a step of one with all of them takes four times as long, and as short as one of them needs.
     Where parameters are hardly known, and for a limit, which may have bent them, it also starts from the nominal values, and from a free
     run of these: the motion of a wrong plant promises little."""
-    problem = bench.problem(wide)
-    n_x = len(wide.states)
+    model, (term,) = with_forms(bench, [form], moved, len(terms))
+    problem, n_x = bench.problem(model), len(model.states)
+    sizes = np.zeros(len(term.free)) if promised is None else promised
     by, still = bench.fit.by.padded(n_x), Filter.none(n_x, len(bench.noise))
     starts, runs = [(*bench.fit.free, *_sized(term, sizes))], []
     if term.form.how == "clip" or any(f.log for f in bench.nominal):
@@ -226,11 +226,11 @@ def _fitted(bench: Bench, base: Fit, wide: Model, moved: Sequence[Motion], terms
         starts.append(max(runs, key=lambda f: f.cost).free)
     best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)
     same = [t for t in terms if (t.form.kind, t.form.where) == (term.form.kind, term.form.where)]
-    level, best = fit_level(replace(bench, model=wide), problem, best, bench.level)
+    level, best = fit_level(replace(bench, model=model), problem, best, bench.level)
     taken = float(np.max(base.taken(best, problem.floor)))  # the force at one place is seen by few sensors
     whole = base.taken_whole(best, problem.floor)
     gain, free = best.criterion() - base.criterion(), max((r.likelihood for r in runs), default=-np.inf)
-    return Trial(term.form, term, best, gain, level, share(bench, [*same, term], best, moved), taken, whole, free)
+    return Trial(term.form, term, best, gain, level, model, share(bench, [*same, term], best, moved), taken, whole, free)
 
 
 def _sized(term: Term, sizes: Array) -> list[Free]:

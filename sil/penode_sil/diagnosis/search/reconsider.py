@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -54,7 +54,7 @@ def centred(rounds: Rounds, grown: Grown) -> Grown:
         bench, _, within = rounds.beside([x for x in grown.accepted if x is not a])
         plain = replace(bench, fit=bench.problem().at([f for f in bench.fit.free if f.target not in none], bench.fit.by))
         t = as_it_is(plain, bench.fit, form, motions(Probe.of(bench)), terms_of(within))
-        t = scored(plain, bench.problem(t.model), rounds.blocks, t)
+        t = scored(plain, rounds.blocks, t)
         rounds.log(f"{form.kind} at {form.where} {form.note}: {_score(t) - _total(grown):.1f} nats more, without offsets")
         if _score(t) >= _total(grown) - MIN_GAIN:
             free = (*t.fit.free, *(replace(f, value=f.origin) for f in biases))
@@ -63,6 +63,33 @@ def centred(rounds: Rounds, grown: Grown) -> Grown:
             if _total(end) >= _total(grown) - MIN_GAIN:
                 return end
     return grown
+
+
+def needed(rounds: Rounds, grown: Grown) -> list[bool]:
+    """Which forms have a name: the large ones, but for one that gains less than MIN_FORM of what another does at its place, input or
+    sensor, each beside all others: the curve of that is not its textbook form, and the small one makes up for the difference. The least
+    goes first, for of two that do the same each gains nothing beside the other."""
+    left, whole = list(grown.accepted), _total(grown)
+    large = [a for a, big in zip(grown.accepted, grown.large, strict=True) if big]
+    while True:
+        gains = {a: _gain(rounds, left, a, whole) for a in large if any(_beside(a, x) for x in large)}
+        less = [a for a in gains if gains[a] <= MIN_FORM * max(gains[x] for x in gains if _beside(a, x))]
+        if not less:
+            return [a in large for a in grown.accepted]
+        least = min(less, key=lambda a: gains[a])
+        rounds.log(f"{name_of(least.trial)} gains {gains[least]:.0f} nats beside the others: it makes up for them")
+        left, large = ([a for a in those if a is not least] for those in (left, large))
+        whole -= gains[least]
+
+
+def _beside(a: Accepted, other: Accepted) -> bool:
+    """Are they two forms at one place, or of one input or sensor?"""
+    return a is not other and a.trial.form.at == other.trial.form.at
+
+
+def _gain(rounds: Rounds, accepted: Sequence[Accepted], a: Accepted, whole: float) -> float:
+    """What a form gains on held-out blocks beside all others [nats], of the score of the `whole`."""
+    return whole - float(np.sum(rounds.beside([x for x in accepted if x is not a])[1]))
 
 
 def _fitted_shapes(a: Accepted, values: Mapping[str, float]) -> Form:

@@ -15,7 +15,7 @@ from ..evidence.bench import SIZES, Bench, fit_level
 from ..evidence.blocks import BLOCKS, Blocks
 from ..evidence.fit import Fit, Problem
 from ..evidence.gain import Level
-from ..evidence.prior import stated
+from ..evidence.prior import Stated, stated
 from ..evidence.screening import Probe
 from ..extend import late
 from . import clipping, holding
@@ -105,8 +105,8 @@ class Rounds:
         """Two causes that together predict left-out blocks better than `scores`, where no cause does alone: the delay and the friction of a
         drive that starts from rest. Empty without any."""
         best, total = [], float(np.sum(scores)) + 2.0 * MIN_GAIN
-        trials, wide = propose(bench, (), self.log, self.stiffer)
-        for t in (scored(bench, bench.problem(x.model or wide), self.blocks, x) for x in trials[:SCORED]):
+        trials = propose(bench, (), self.log, self.stiffer)
+        for t in (scored(bench, self.blocks, x) for x in trials[:SCORED]):
             beside, terms = adopt(bench, t, 0)
             beside, level = _based(beside, self.blocks)
             first = Accepted(t, 0, tuple(terms), (t,))
@@ -133,11 +133,11 @@ class Rounds:
     def good(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> tuple[Trial, ...]:
         """Trials that predict left-out blocks better than `scores` by MIN_GAIN, the best first. If a large form predicts as well as the
         best, to MIN_GAIN, only large ones; otherwise the large form only imitates a smaller one."""
-        trials, wide = propose(bench, terms_of(accepted), self.log, self.stiffer)
+        trials = propose(bench, terms_of(accepted), self.log, self.stiffer)
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
         freest = sorted(trials, key=lambda t: -t.run)[:1]
         trials = [t for t in trials if t in trials[:SCORED] or t in freest]
-        trials = holding.told_apart(bench, wide, [scored(bench, bench.problem(t.model or wide), self.blocks, t) for t in trials])
+        trials = holding.told_apart(bench, [scored(bench, self.blocks, t) for t in trials])
         better = [t.blocks - scores for t in trials]
         for t, b in zip(trials, better, strict=True):
             self.log(
@@ -149,7 +149,7 @@ class Rounds:
         matter = [t for t in good if _matters(t)]
         if matter and max(np.sum(t.blocks) for t in good) - max(np.sum(t.blocks) for t in matter) <= MIN_GAIN:
             good = matter
-        return tuple(sorted(good, key=lambda t: -float(np.sum(t.blocks))))
+        return tuple(like_the_file(sorted(good, key=lambda t: -float(np.sum(t.blocks))), scores))
 
 
 def terms_of(accepted: Sequence[Accepted]) -> list[Term]:
@@ -210,10 +210,10 @@ def _converged(bench: Bench, problem: Problem) -> tuple[Level, Fit]:
     return level, fit
 
 
-def scored(bench: Bench, problem: Problem, blocks: Blocks, t: Trial) -> Trial:
+def scored(bench: Bench, blocks: Blocks, t: Trial) -> Trial:
     """A trial with its scores, as those of a bench."""
     own = [] if t.level == bench.level else [bench.level.size]
-    level, fit, scores = blocks.fit_level(replace(bench, model=problem.predictor.model), problem, t.fit, t.level, own)
+    level, fit, scores = blocks.fit_level(replace(bench, model=t.model), bench.problem(t.model), t.fit, t.level, own)
     return replace(t, level=level, fit=fit, blocks=scores - stated(fit.free) / len(scores))
 
 
@@ -236,6 +236,14 @@ def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Tri
     return found
 
 
+def like_the_file(trials: Sequence[Trial], base: Array) -> list[Trial]:
+    """Trials, the best first, without those at the place of the best that are about as good (`margin`) as one there whose fit takes fewer
+    values of the file away: one curve in two words, for a stop beside a spring that has gone is a play."""
+    near = [t for t in trials if t.form.at == trials[0].form.at and np.sum(trials[0].blocks - t.blocks) <= margin(t, base)]
+    gone = [sum(isinstance(f, Stated) and mostly(abs(f.value - f.origin) / abs(f.origin)) for f in t.fit.free) for t in near]
+    return [t for t in trials if t not in near or gone[near.index(t)] == min(gone)]
+
+
 def _simplicity(t: Trial, other: Trial) -> float:
     """Share of MIN_FORM by which a form may gain less than another of more values: MIN_FORM where it has half of them, all where it has
     less. A mass on a spring and a damper may stand for many a law with one value, a spring and a damper for a delay."""
@@ -256,8 +264,9 @@ def _is_enough(part: Trial, t: Trial) -> bool:
 
 
 def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
-    """Is a form enough better, with a size that is not zero, nor a delay too short to be one, nor a limit that samples are beyond?"""
-    if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN):
+    """Is a form enough better, with no block that it predicts worse by MIN_GAIN and by more than it gains on average, and a size that is
+    not zero, nor a delay too short to be one, nor a limit that samples are beyond?"""
+    if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN and -np.min(better) < max(MIN_GAIN, np.mean(better))):
         return False
     if t.form.how in late.HOW and t.fit.value(t.term.free[0].target) < late.SHORT * bench.step:
         return False

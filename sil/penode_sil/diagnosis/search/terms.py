@@ -50,19 +50,19 @@ class Trial:
     """A form beside those accepted, fitted: `gain` of the criterion; `share` of the force there (see `worth`); `taken`, the share of
     a sensor's innovation power beyond its noise that it explains, of the sensor that shows it most; `whole`, that share over all sensors
     together; `run`: log likelihood of its free run, where one was made; `blocks` [blocks] of predictive density, none before it is scored;
-    `model`: that of the fit, where it is not that of all trials of its round."""
+    `model`: that of the fit, with this form and those accepted."""
 
     form: Form
     term: Term
     fit: Fit
     gain: float
     level: Level
+    model: Model
     share: float = 0.0
     taken: float = 0.0
     whole: float = 0.0
     run: float = -np.inf
     blocks: Array = field(default_factory=lambda: np.zeros(0))
-    model: Model | None = None
 
 
 def drive(bench: Bench, index: int) -> Drive:

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+# Copyright (c) 2026 the penode authors
+"""An observer that does not follow, a neighbour of a fit that diverges, a block that is against a form."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from curves import integrate
+
+import penode_gen
+from penode_sil.diagnosis.evidence.bench import build, with_tolerances
+from penode_sil.diagnosis.evidence.fit import _log_determinant
+from penode_sil.diagnosis.evidence.observer import Record, sample_noise
+from penode_sil.diagnosis.plant import plant
+from penode_sil.diagnosis.search import rounds
+from penode_sil.diagnosis.study import driven
+from penode_sil.recordings.measured import load
+
+WIPER = """
+[model]
+name = "wiper"
+sample_time = "2 ms"
+input = "held"
+[parameters]
+J_m = { value = 2.31e-5, unit = "kg*m^2", tolerance = 0.06 }
+J_a = { value = 0.0339, unit = "kg*m^2", tolerance = 0.05 }
+ratio = { value = 0.0192307692308, unit = "1", exact = true }
+k = { value = 93.7, unit = "N*m/rad", tolerance = 0.12 }
+d = { value = 0.479, unit = "N*m*s/rad", tolerance = 0.15 }
+b_m = { value = 1.16e-4, unit = "N*m*s/rad", tolerance = 0.15 }
+T_f = { value = 1.01, unit = "N*m", tolerance = 0.15 }
+[inputs]
+T = { unit = "N*m" }
+[bodies]
+motor = { inertia = "J_m", position = "phi_m", velocity = "omega_m" }
+arm = { inertia = "J_a", position = "phi_a", velocity = "omega_a" }
+[points]
+shaft = "ratio*phi_m"
+[elements]
+drive = { between = ["motor", "ground"], law = "expression", force = "-T" }
+bearing = { between = ["motor", "ground"], law = "linear_damper", damping = "b_m" }
+linkage = { between = ["shaft", "arm"], law = "linear_spring", stiffness = "k" }
+linkage_d = { between = ["shaft", "arm"], law = "linear_damper", damping = "d" }
+blade = { between = ["arm", "ground"], law = "coulomb_friction", force = "T_f", transition = "0.05 rad/s" }
+[outputs]
+twist = { value = "ratio*phi_m - phi_a", unit = "rad" }
+[sensors]
+n = { value = "omega_m", unit = "rad/s", noise = 1.0 }
+arm = { value = "phi_a", unit = "rad", noise = 0.001 }
+"""
+
+
+def test_a_stick_slip_that_the_observer_does_not_follow_leaves_the_starts_where_they_were(tmp_path):
+    """Its friction turns within 0.05 rad/s, 1.7 ms: an observer with corrections every 6 ms diverges to 1e200, and start states had that
+    size. The arm moves by 0.7 rad, the motor by 52 times that."""
+    h, n = 0.002, 4000
+    t = np.arange(n + 1) * h
+    torque = np.repeat((0.06 * np.sin(3.5 * t) * np.minimum(t, 1.0))[::5], 5)[: n + 1].tolist()
+
+    def rates(time, x):
+        s, v = x[0] / 52.0 - x[2], x[1] / 52.0 - x[3]
+        force = 88.0 * s + 0.5 * v
+        driving = torque[min(int(time / h + 1e-6), n)]
+        return x[1], (driving - 1.2e-4 * x[1] - force / 52.0) / 2.4e-5, x[3], (force - np.tanh(x[3] / 0.05)) / 0.035
+
+    moved = integrate(rates, [0.0] * 4, h, n, 8)[0]
+    rng = np.random.default_rng(3)
+    seen = moved[1][:n] + rng.standard_normal(n), moved[2][:n] + 0.001 * rng.standard_normal(n)
+    np.savetxt(
+        tmp_path / "r.csv",
+        np.column_stack([t[:n], torque[:n], *seen]),
+        "%.9g",
+        ",",
+        header="time [s],T [N*m],n [rad/s],arm [rad]",
+        comments="",
+    )
+    (tmp_path / "model.toml").write_text(WIPER)
+    model = with_tolerances(penode_gen.load(tmp_path / "model.toml"))
+    e = driven.experiment(load([tmp_path / "r.csv"], model)[0], model)
+    places = plant.places(model)
+    fastest = plant.linearise(model, places, np.array([model.start]), e.u[:1]).fastest
+    bench = build(model, places, [Record.of(e)], sample_noise([Record.of(e)], np.array([1.0, 0.001])), fastest)
+    sizes = np.array([f.unit for f in bench.fit.free if f.target[0] == "start"])
+    assert (sizes < 1e3).all() and np.isfinite(bench.fit.cost) and np.isfinite(bench.fit.slopes).all()
+
+
+def test_the_width_of_a_posterior_is_finite_where_a_neighbour_diverges():
+    """Curvatures of 1e41 beside others: the plain determinant rounds to 0, and its logarithm to minus infinity."""
+    rng = np.random.default_rng(1)
+    root = rng.standard_normal((5, 30)) * np.geomspace(1.0, 1e6, 5)[:, None]
+    assert _log_determinant(root @ root.T) == pytest.approx(np.linalg.slogdet(root @ root.T)[1], abs=1e-9)
+    steep = np.full((6, 6), 4.9e41) + np.diag(np.geomspace(1.0, 1e20, 6))
+    assert not np.isfinite(np.linalg.slogdet(steep)[1])
+    assert 6.0 * np.log(4.9e41) + 5.0 * np.log(1e-12) - 1.0 < _log_determinant(steep) < 6.0 * np.log(4.9e41)
+
+
+@pytest.mark.parametrize(
+    "better, accepted",
+    [
+        ([80.0, 90.0, -100.0, 94.0], False),
+        ([80.0, 90.0, -30.0, 94.0], True),
+        ([4.0, 5.0, 11.0, -9.0], True),
+        ([4.0, 4.0, 1.0, -0.5], False),
+    ],
+)
+def test_no_block_is_against_a_form_by_more_than_blocks_are_for_it(better, accepted):
+    """Friction of a wheel holds it between bumps, where the noise of the road moves a model without: three blocks gain, the one with the
+    bump loses."""
+    fit = SimpleNamespace(value=lambda target: 1.0, deviation=lambda target, known: 0.1)
+    form = SimpleNamespace(how="force")
+    trial = SimpleNamespace(form=form, fit=fit, term=SimpleNamespace(free=[SimpleNamespace(target="f", origin=0.0, log=False)]))
+    rig = SimpleNamespace(model=None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rounds, "undetermined", lambda model, fit: ())
+        assert rounds._accepted(rig, trial, np.array(better)) == accepted
