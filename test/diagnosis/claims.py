@@ -76,3 +76,8 @@ def claims(causes: Sequence[Mapping], correct: Sequence[bool], nominal: Mapping[
         }
         for c, ok in zip(causes, correct, strict=True)
     ]
+
+
+def judged_by(diagnosis: Mapping) -> dict[str, float | None]:
+    """For a row: what a diagnosis explains, and the trust in that by which it has multiplied the posterior of its causes."""
+    return {"explained": diagnosis.get("explained"), "trust": (diagnosis.get("reliability") or {}).get("trust")}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
 """
-Is a stated confidence what it says: of causes named with 90 %, are 90 % right?
+Is a stated confidence what it says: of causes named with 90 %, are 90 % right? And what may it be: of answers that explain as much?
 
     build/venv/bin/python test/diagnosis/reliability.py build/campaign/rows.jsonl build/worlds/main/rows.jsonl ...
     build/venv/bin/python test/diagnosis/reliability.py ROWS.jsonl... --take-over      and reports of `penode diagnose` state it
@@ -20,12 +20,14 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import numpy as np
 from score import wilson
 
 TABLE = (
     Path(__file__).resolve().parents[2] / "sil/penode_sil/diagnosis/templates/reliability.json"
 )  # of which penode_sil.diagnosis.reliability reads
 APART = 0.05  # that mean confidence and share right may be, over all
+LEVELS = (0.99, 0.9, 0.0)  # shares of the avoidable residual: from each on, up to the one before, answers are trusted alike
 
 
 def read(path: Path, command: str) -> tuple[list[dict], dict]:
@@ -40,6 +42,7 @@ def read(path: Path, command: str) -> tuple[list[dict], dict]:
             elif row.get("command", command) == command:
                 found[f"{row.get('stratum')} {row['case']}"] = row
                 claimed = row["named"]
+                row |= {"explained": row.get("explained"), "trust": row.get("trust") if claimed else None}
                 sound = all({"confidence", "right", "nothing"} <= set(c) and 0.0 <= (c["confidence"] or 0.0) <= 1.0 for c in claimed)
                 if not sound:
                     raise ValueError
@@ -90,6 +93,33 @@ def table(rows: Sequence[Mapping]) -> dict:
         "nothing": [f"{r['case']} {c['cause']}" for r in rows for c in r["named"] if c["nothing"]],
         "unstated": sum(c["confidence"] is None for r in rows for c in r["named"]),
     }
+
+
+def learnt(rows: Sequence[Mapping]) -> list[dict]:
+    """For each of LEVELS: causes that a search named, how many were right, and their share of the posterior, as after one right and one
+    wrong one more. A fault that samples show by themselves is more certain than any of these, and does not count."""
+    found = []
+    for level, above in zip(LEVELS, (np.inf, *LEVELS), strict=False):
+        named = [(c, r["trust"]) for r in rows if r["trust"] and level <= r["explained"] < above for c in r["named"] if _searched(c, r)]
+        right, posterior = sum(c["right"] for c, _ in named), sum(c["confidence"] / trust for c, trust in named)
+        share = min((right + 1.0) / (posterior + 2.0), 0.99)
+        found.append({"explained": level, "named": len(named), "right": right, "share": round(share, 4)})
+    return found
+
+
+def trusted(rows: Sequence[Mapping], levels: Sequence[Mapping]) -> list[dict]:
+    """Rows with the confidences that these levels give."""
+    found = []
+    for r in rows:
+        share = next(x["share"] for x in levels if (r["explained"] or 0.0) >= x["explained"])
+        named = [c | {"confidence": c["confidence"] / r["trust"] * share} if _searched(c, r) else c for c in r["named"]]
+        found.append({**r, "named": named})
+    return found
+
+
+def _searched(claim: Mapping, row: Mapping) -> bool:
+    """Is a named cause one of the search, whose confidence is a posterior times the trust in what the answer explains?"""
+    return bool(row["trust"]) and claim["confidence"] is not None and claim["confidence"] <= row["trust"] + 1e-9
 
 
 def text(t: Mapping) -> str:
@@ -148,18 +178,24 @@ def parsed() -> argparse.Namespace:
 def main() -> int:
     asked = parsed()
     read_all = [read(path, asked.command) for path in asked.rows]
-    t, made = table([row for rows, _ in read_all for row in rows]), [m for _, m in read_all]
+    rows, made = [row for some, _ in read_all for row in some], [m for _, m in read_all]
+    t = table(rows)
     if not t["named"]:
         return _bad(f"{', '.join(map(str, asked.rows))}: no named cause with a confidence")
     for m in made:
         m["codes"] = [c or asked.code for c in m["codes"]]
     print(text(t))
+    if asked.take_over and not any(r["trust"] for r in rows):
+        return _bad("not taken over: no row says what its answer explains; run the campaign again")
     if asked.take_over:
         if any(not c or c.endswith("-dirty") or c.startswith("an unknown") for m in made for c in m["codes"]):
             return _bad(
                 "not taken over: the rows do not say which commit made them, or it had changes; --code names it where they say none"
             )
-        kept = {"source": source(made), "cases": t["cases"], "deciles": t["deciles"]}
+        levels = learnt(rows)
+        t = table(trusted(rows, levels))
+        print(f"with what was learnt:\n{text(t)}")
+        kept = {"source": source(made), "cases": t["cases"], "trust": levels, "deciles": t["deciles"]}
         TABLE.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
         print(f"-> {TABLE}")
     return int(asked.gate and bool(wrong(t)))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import permutations
 from math import ceil, sqrt
 
-from claims import claims, right as rightly
+from claims import claims, judged_by, right as rightly
 
 OUTSIDE = "outside_taxonomy"
 MOST_ALTERNATIVES = 4  # who lists more has not decided
@@ -114,6 +114,7 @@ def score(
     causes, verdict = diagnosis.get("causes") or [], diagnosis.get("verdict")
     what = outcome(truth, causes, verdict)
     row |= {"answer": [" at ".join(_named(c)) for c in causes], "verdict": verdict, "right": what == "right", "outcome": what}
+    row |= judged_by(diagnosis)
     named = [c for c in causes if isinstance(c, Mapping) and c.get("kind") != OUTSIDE]
     row["named"] = claims(named, rightly(named, truth["effects"], lambda c, e: explains(c, e, told=False)), nominal or {})
     pairs = pairing(causes, truth["effects"], truth["bound"]) if what == "right" else None

@@ -19,8 +19,9 @@ def claim(confidence, right, nothing=False):
 
 
 def written(path, claims, head=None, **more):
-    """Rows of one case for each claim."""
-    rows = [{"case": f"7:{i}", "stratum": "main", "named": [c], **more} for i, c in enumerate(claims)]
+    """Rows of one case for each claim, of answers that explain all."""
+    judged = {"explained": 1.0, "trust": 0.97}
+    rows = [{"case": f"7:{i}", "stratum": "main", "named": [c], **judged, **more} for i, c in enumerate(claims)]
     path.write_text("".join(json.dumps(r) + "\n" for r in [*[head] * bool(head), *rows]))
     return path
 
@@ -114,9 +115,10 @@ def test_changes_are_adopted_and_reported(tmp_path, monkeypatch):
     call = ["reliability.py", *map(str, rows), "--take-over"]
     monkeypatch.setattr(sys, "argv", call)
     assert reliability.main() == 0
-    known = told.reliability([Cause("coulomb_friction", "damper", {}, 0.99)], reliability.TABLE)
+    known = told.reliability([Cause("coulomb_friction", "damper", {}, 0.94)], 1.0, reliability.TABLE)
+    assert known["trust"] == pytest.approx((44 + 1) / (40 + 10 * 0.55 / 0.97 + 2), abs=1e-4)  # right ones over their posterior
     low, high = (f"{100 * x:.0f}" for x in stats.binomtest(39, 40).proportion_ci(method="wilson"))
-    assert told.line(known, 0.99) == (
+    assert told.line(known, 0.94) == (
         f"of causes named with 90 to 100 % confidence in simulated cases, 39 of 40 were right (98 %, 95 % interval {low} to {high} %); "
         "source: 40 cases of seed 7 and 10 of seed 7, commit abc"
     )
@@ -128,14 +130,31 @@ def test_changes_are_adopted_and_reported(tmp_path, monkeypatch):
         assert reliability.main() == 2 and not reliability.TABLE.exists()
 
 
+def test_trust_is_learnt_from_what_answers_explain(tmp_path):
+    """Of 30 causes in answers that explain all 29 are right, of 20 in answers that explain nine tenths 10, of none with less; faults that
+    samples show are more certain than any of these, and leave that as it is."""
+
+    def rows(explained, count, right, confidence=0.9):
+        return [{"case": f"7:{k}", "explained": explained, "trust": 0.9, "named": [claim(confidence, k < right)]} for k in range(count)]
+
+    made = [*rows(1.0, 30, 29), *rows(0.95, 20, 10), *rows(1.0, 5, 0, 0.99)]
+    levels = reliability.learnt(made)
+    assert [(x["named"], x["right"], x["share"]) for x in levels] == [(30, 29, 0.9375), (20, 10, 0.5), (0, 0, 0.5)]
+    shares = {c["confidence"] for r in reliability.trusted(made, levels) for c in r["named"]}
+    assert shares == {0.9375, 0.5, 0.99}
+    table = tmp_path / "table.json"
+    table.write_text(json.dumps({"trust": levels}))
+    assert [told.trust(x, table) for x in (1.0, 0.99, 0.95, 0.0, -0.2)] == [0.9375, 0.9375, 0.5, 0.5, 0.5]
+
+
 def test_without_a_table_that_is_said(tmp_path):
-    assert told.reliability([], tmp_path / "none.json") is None
+    assert told.reliability([], 1.0, tmp_path / "none.json") is None
     assert told.line(None, 0.9) == "how often causes named with this confidence are right is not recorded"
 
 
 def test_kept_table_is_sound():
     """The one in the package, if there is one."""
     causes = [Cause("coulomb_friction", "damper", {}, k / 20) for k in range(21)]
-    if (known := told.reliability(causes)) is not None:
+    if (known := told.reliability(causes, 1.0)) is not None:
         assert known["source"] and known["cases"] > 0 and known["deciles"]
         assert all(0 < d["named"] >= d["right"] and d["ci95"][0] <= d["right"] / d["named"] <= d["ci95"][1] for d in known["deciles"])

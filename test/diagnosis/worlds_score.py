@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from itertools import permutations
 
-from claims import claims, right
+from claims import claims, judged_by, right
 
 OUTSIDE = "outside_taxonomy"
 FORCELESS = ("wrong_parameter", "sensor_", "input_", "integration_error")  # causes that need no law
@@ -115,7 +115,7 @@ def score(truth: Mapping, diagnosis: Mapping | None, nominal: Mapping[str, float
         "outcome": what,
         "right": what == "right",
         "covered": covered,
-    }
+    } | judged_by(diagnosis or {})
 
 
 def small(notes: Sequence[str]) -> list[str]:

@@ -305,6 +305,7 @@ def test_command_writes_all_and_is_silent_in_a_pipe(tmp_path, monkeypatch):
         "source": "100 cases of seed 7",
         "cases": 100,
         "deciles": [{"from": 0.9, "to": 1.0, "named": 60, "right": 51, "ci95": [0.74, 0.92]}],
+        "trust": [{"explained": 0.0, "named": 60, "right": 56, "share": 0.95}],
     }
     (tmp_path / "table.json").write_text(json.dumps(table))
     monkeypatch.setattr(reliability, "TABLE", tmp_path / "table.json")
@@ -329,7 +330,7 @@ def test_command_writes_all_and_is_silent_in_a_pipe(tmp_path, monkeypatch):
     assert done.exit_code == 0 and done.stderr == ""
     written = json.loads((tmp_path / "d" / "diagnosis.json").read_text())
     assert json.loads(done.stdout) == written and written["causes"][0]["kind"] == "coulomb_friction"
-    assert written["advice"] and written["reliability"] == table
+    assert written["advice"] and written["reliability"] == {**table, "trust": 0.95}
     assert {"verdict", "causes", "gain", "numerics", "residual", "data"} <= set(written) and "shown" not in written
     text = (tmp_path / "d" / "report.html").read_text(encoding="utf-8")
     tree = Tree(text)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""How often causes named with the same confidence were right: the table that test/diagnosis/reliability.py --take-over keeps in
-templates/."""
+"""How often named causes were right in simulated cases, by what they explain and by their confidence: the tables that
+test/diagnosis/reliability.py --take-over keeps in templates/."""
 
 from __future__ import annotations
 
@@ -17,15 +17,23 @@ from .result import OUTSIDE, Cause
 TABLE = resource("penode_sil.diagnosis", "templates", "reliability.json")  # beside the page that states it
 
 
-def reliability(causes: Sequence[Cause], table: Path | None = None) -> dict[str, Any] | None:
-    """What is known of these causes: its `source`, and the `deciles` of confidence that they are in; None if no table is kept."""
+def trust(explained: float, table: Path | None = None) -> float:
+    """How likely the best explanation of the catalogue is right that takes away this share of the avoidable residual: the share that was,
+    of the posterior of those which took about as much."""
+    levels = json.loads((table or TABLE).read_text(encoding="utf-8"))["trust"]
+    return float(next((x["share"] for x in levels if explained >= x["explained"]), levels[-1]["share"]))
+
+
+def reliability(causes: Sequence[Cause], explained: float, table: Path | None = None) -> dict[str, Any] | None:
+    """What is known of these causes, which take the share `explained` of the avoidable residual: its `source`, the `deciles` of confidence
+    that they are in, and the `trust` that their posterior was multiplied by; None if no table is kept."""
     table = table or TABLE
     if not table.exists():
         return None
     kept = json.loads(table.read_text(encoding="utf-8"))
     own = [c.confidence for c in causes if c.kind != OUTSIDE]
     deciles = [d for d in kept["deciles"] if any(_in(d, x) for x in own)]
-    return {"source": kept["source"], "cases": kept["cases"], "deciles": deciles}
+    return {"source": kept["source"], "cases": kept["cases"], "deciles": deciles, "trust": trust(explained, table)}
 
 
 def _in(decile: dict[str, Any], confidence: float) -> bool:

@@ -20,6 +20,7 @@ from .evidence.bench import UNSTATED
 from .extend import absorb, applied, measuring, nameless
 from .extend.resolving import resolved
 from .plant import plant
+from .reliability import trust
 from .result import EXTENDED, UNKNOWN, Cause, Diagnosis, Gain, Named
 from .search import naming
 from .search.worth import WORTH
@@ -135,7 +136,9 @@ def _judged(study: Study, measured: Study, found: naming.Answer, after: Sequence
         verdict, causes = "unexplained", ()
     if coarse and verdict != "unexplained":
         causes, verdict = (*causes, coarse), "explained" if verdict == "no_discrepancy" else verdict
-    sets, tone = _explanations(causes, found.explanations), tones.tone(study.experiments, study.metrics, after)
+    causes = tuple(replace(c, confidence=trust(share) * c.confidence) for c in causes)
+    likely = [(names, trust(share) * p) for names, p in found.explanations]
+    sets, tone = _explanations(causes, likely), tones.tone(study.experiments, study.metrics, after)
     verdict, causes = beside_faults(verdict, causes, faults, tone.detected)
     notes += [*found.notes, *filter(None, [plant.placeless(study.places)]), *([tones.note(model, tone)] if tone.detected else [])]
     return Judged(verdict, causes, share, numbers, tuple(notes), sets, doubt)

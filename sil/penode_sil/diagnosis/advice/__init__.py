@@ -70,7 +70,7 @@ def advised(d: Diagnosis, model: Model) -> Diagnosis:
     causes = tuple(_with_alike(model, c) for c in d.causes)
     causes = tuple(replace(c, separate=separating(c.kind, [a.kind for a in c.alternatives], model)) for c in causes)
     d = replace(d, causes=causes)
-    return replace(d, reliability=reliability(causes), advice=advice(d, model))
+    return replace(d, reliability=reliability(causes, d.explained), advice=advice(d, model))
 
 
 def _with_alike(model: Model, c: Cause) -> Cause:

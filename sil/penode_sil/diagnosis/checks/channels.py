@@ -22,8 +22,8 @@ from ...errors import RecordingError
 from ..catalogue import channels
 from ..extend import applied
 from ..extend.entries import extends, table
+from ..reliability import trust
 from ..result import OUTSIDE, Cause, Diagnosis
-from ..search.worth import RIGHT
 from ..study.fit import Free, Problem
 from ..study.noise import Experiment, Metric, metric
 from ..study.study import guessed, uncertain
@@ -210,11 +210,11 @@ def _sections(model: Model, found: Sequence[Mix]) -> dict[str, list[str]]:
 
 def with_mixes(model: Model, found: Sequence[Mix], d: Diagnosis) -> Diagnosis:
     """The answer of a search with corrected channels; the faults of the channels are its first causes."""
-    own = tuple(Cause(m.kind, ",".join(m.names(model)), {}, RIGHT) for m in found)
+    own = tuple(Cause(m.kind, ",".join(m.names(model)), {}, trust(d.explained)) for m in found)
     if not own:
         return d
     names = [{"kind": c.kind, "where": c.where} for c in own]
-    sets = tuple({**s, "causes": [*names, *s["causes"]]} for s in d.explanations) or ({"causes": names, "posterior": RIGHT},)
+    sets = tuple({**s, "causes": [*names, *s["causes"]]} for s in d.explanations) or ({"causes": names, "posterior": own[0].confidence},)
     causes = (*own, *(c for c in d.causes if c.kind != OUTSIDE))
     verdict = "explained" if d.verdict in ("explained", "no_discrepancy") else "partly_explained"
     return replace(d, causes=causes, explanations=sets, verdict=verdict)

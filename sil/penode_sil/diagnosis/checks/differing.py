@@ -15,8 +15,9 @@ from penode_gen.model import Parameter
 
 from ..extend import measuring
 from ..extend.entries import table, toml, unlike
+from ..reliability import trust
 from ..result import Cause, Diagnosis, Named, Value
-from ..search.worth import RIGHT, Z_95
+from ..search.worth import Z_95
 from ..study.fit import Fit, Free, Problem
 from ..study.noise import UNSEEN
 from ..study.residual import stated_noise
@@ -115,17 +116,17 @@ def _end(case: Case, study: Study, good: Sequence[Own]) -> End:
         s: Value(v, units.si(p.unit), (v - Z_95 * sd, v + Z_95 * sd)) for s, (v, sd) in zip(sets.values(), best.values(), strict=True)
     }
     others = tuple(Named(KIND, x.name) for x in good[1:] if x.fit.cost - best.fit.cost < CHANCE * CHANCE)
-    cause = Cause(KIND, best.name, values, RIGHT / (1 + len(others)), others)
     extended = write_extended(_text(case, best, sets), case)
     seen = replace(study, model=case.model, seen=look(study, study.null))
     gain, notes, held = measuring.measure(seen, extended, case.unused) if case.unused else ({}, [], [])
     noise = rows(study)
-    taken = (study.null.cost - best.fit.cost) / max(study.null.cost - noise, 1.0)
+    taken = min((study.null.cost - best.fit.cost) / max(study.null.cost - noise, 1.0), 1.0)
+    cause = Cause(KIND, best.name, values, trust(taken) / (1 + len(others)), others)
     evidence = (study.null.cost - noise) / float(np.sqrt(2.0 * noise))
     sure = ({"causes": [{"kind": KIND, "where": best.name}], "posterior": cause.confidence},)
     notes = [*case.remarks, *notes, f"each recording has a parameter set of its own in the extended model: {', '.join(sets.values())}"]
     found = numerics.numerics(seen)[0]
-    answer = Diagnosis("explained", (cause,), gain, found, min(taken, 1.0), evidence, 0.0, tuple(notes), explanations=sure)
+    answer = Diagnosis("explained", (cause,), gain, found, taken, evidence, 0.0, tuple(notes), explanations=sure)
     return End(answer, seen, extended, best.fit, held, sets=sets)
 
 

@@ -18,6 +18,7 @@ from .. import catalogue
 from ..catalogue import drives, values as of_values
 from ..catalogue.friction import turns
 from ..evidence.bench import with_tolerances
+from ..reliability import trust
 from ..report.figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, UNKNOWN, Cause, place
 from ..search.worth import RATIO
@@ -155,10 +156,9 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
     if end.withheld and (whole or clear):
         names = [place(c.kind, c.where) for c in end.withheld]
         notes = tuple(n for n in d.notes if not any(n.startswith(f"{name} is real but small") for name in names))
-        sets = (
-            {"causes": [{"kind": c.kind, "where": c.where} for c in end.withheld], "posterior": min(c.confidence for c in end.withheld)},
-        )
-        return replace(end, answer=replace(d, causes=tuple(end.withheld), explanations=sets, notes=notes))
+        causes = tuple(replace(c, confidence=trust(d.explained) * c.confidence) for c in end.withheld)
+        sets = ({"causes": [{"kind": c.kind, "where": c.where} for c in causes], "posterior": min(c.confidence for c in causes)},)
+        return replace(end, answer=replace(d, causes=causes, explanations=sets, notes=notes))
     if found := values.few(case, end, table):
         return by_values(case, replace(end, answer=d), table, found)
     if end.answer.verdict == "unexplained":
@@ -184,13 +184,13 @@ def spread(case: Case, end: End, table: Table) -> list[values.Few]:
 
 def by_values(case: Case, end: End, table: Table, found: Sequence[values.Few]) -> End:
     """The end that names these values, with no others in the written model."""
-    best, causes = found[0], values.caused(case, found)
+    best, causes = found[0], values.caused(case, end, found)
     extended = write_extended(values.text(case, causes, best), case)
     fit = replace(end.study.null, simulated=best.fit.simulated)
     d = end.answer
     if d.verdict == "unexplained":
         d = replace(d, verdict="explained", explained=values.taken(end, best), notes=tuple(case.remarks))
-    d = replace(d, causes=causes, explanations=values.explanations(found))
+    d = replace(d, causes=causes, explanations=values.explanations(end, found))
     return replace(end, answer=d, extended=extended, fit=fit, without=None)
 
 

@@ -21,8 +21,9 @@ from penode_gen.model import Model, Parameter
 from ...compared import worsened
 from ..catalogue import values as of_values
 from ..extend.entries import table
+from ..reliability import trust
 from ..result import Cause, Value
-from ..search.worth import RIGHT, Z_95
+from ..search.worth import Z_95
 from ..study.fit import Fit, Free, Problem
 from ..study.study import uncertain
 from .case import Case, End
@@ -137,27 +138,27 @@ def _sizes(x: Few) -> list[float]:
     return [*values, *(abs(v) * float(np.sqrt(max(covariance[k, k], 0.0))) for v, k in zip(values, at, strict=True))]
 
 
-def posterior(found: Sequence[Few]) -> list[float]:
-    """The probability of each of them; all others together have the rest."""
+def posterior(end: End, found: Sequence[Few]) -> list[float]:
+    """The probability of each of them; what is not in the catalogue has the rest."""
     likely = np.exp([0.5 * (found[0].fit.cost - x.fit.cost) for x in found])
-    return [float(p) for p in RIGHT * likely / likely.sum()]
+    return [float(p) for p in trust(taken(end, found[0])) * likely / likely.sum()]
 
 
-def caused(case: Case, found: Sequence[Few]) -> tuple[Cause, ...]:
+def caused(case: Case, end: End, found: Sequence[Few]) -> tuple[Cause, ...]:
     """The best set as causes, each with the parameters of the other sets as its alternatives."""
     sizes, names = _sizes(found[0]), found[0].names
     others = list(dict.fromkeys(n for x in found[1:] for n in x.names if n not in names))
     causes = []
     for name, value, sd in zip(names, sizes[: len(names)], sizes[len(names) :], strict=True):
         interval = Value(value, units.si(case.model.parameters[name].unit), (value - Z_95 * sd, value + Z_95 * sd))
-        causes.append(of_values.cause(name, interval, posterior(found)[0], others))
+        causes.append(of_values.cause(name, interval, posterior(end, found)[0], others))
     return tuple(causes)
 
 
-def explanations(found: Sequence[Few]) -> tuple[dict[str, object], ...]:
+def explanations(end: End, found: Sequence[Few]) -> tuple[dict[str, object], ...]:
     """All sets with their posterior."""
     return tuple(
-        {"causes": [asdict(of_values.named(n)) for n in x.names], "posterior": p} for x, p in zip(found, posterior(found), strict=True)
+        {"causes": [asdict(of_values.named(n)) for n in x.names], "posterior": p} for x, p in zip(found, posterior(end, found), strict=True)
     )
 
 

@@ -31,12 +31,10 @@ from .innovate import Found
 from .propose import FREE_RUN, motions
 from .rounds import MIN_TAKEN, name_of, terms_of
 from .terms import Term, Trial
-from .worth import RIGHT, WORTH, Z_95, least, share, systematic, undetermined
+from .worth import WORTH, Z_95, least, share, systematic, undetermined
 
 Array = NDArray[np.float64]
-RIVAL = (
-    1.0 - RIGHT
-) / RIGHT  # posterior, RIGHT of which is as much as what is not in the catalogue has: from there on an explanation is listed
+RIVAL = 0.075  # posterior from which on an explanation is listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +142,7 @@ def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[F
 
     def judged(found: Found) -> tuple[Found, list[Motion], parameters.Judged]:
         moved = motions(Probe.of(found.plain))
-        return found, moved, parameters.judge(model, found, moved, RIGHT, log)
+        return found, moved, parameters.judge(model, found, moved, 1.0, log)
 
     first = judged(innovate.search(bench, log))
     small = [a for a in first[0].small if a.trial.share > first[0].level]  # what is no more than the rest would name that at random
@@ -197,19 +195,18 @@ def _sure(names: Sequence[tuple[Form, float]], form: Form) -> float:
 
 
 def _explanations(named: Sequence[tuple[Term, Sequence[tuple[Form, float]]]]) -> tuple[tuple[tuple[Named, ...], float], ...]:
-    """Sets of causes with their posterior: the one found, and it with one cause exchanged for a rival; what is not in the catalogue has the
-    rest."""
+    """Sets of causes with their posterior among those of the catalogue: the one found, and it with one cause exchanged for a rival."""
     own = tuple(dict.fromkeys(Named(*name_of(t)) for t, _ in named))
     if not own:
         return ()
     sure = [_sure(options, t.form) for t, options in named]
-    sets = [(own, RIGHT * float(np.prod(sure)))]
+    sets = [(own, float(np.prod(sure)))]
     for k, (term, options) in enumerate(named):
-        others = RIGHT * float(np.prod(sure[:k] + sure[k + 1 :]))
+        others = float(np.prod(sure[:k] + sure[k + 1 :]))
         for r in _rivals(options, term):
             p = next(p for f, p in options if (f.kind, f.where) == (r.kind, r.where))
             sets.append((tuple(r if n == Named(*name_of(term)) else n for n in own), others * p))
-    whole = max(sum(p for _, p in sets) / RIGHT, 1.0)  # forms of one curve count for the simplest of them, and each for itself
+    whole = max(sum(p for _, p in sets), 1.0)  # forms of one curve count for the simplest of them, and each for itself
     return tuple((names, p / whole) for names, p in sets)
 
 
@@ -260,7 +257,7 @@ def _cause(
             alone = term.free[0].target
             sd = wider * abs(value) * bench.fit.deviation(alone, ratios) / max(abs(bench.fit.value(alone)), 1e-300)
         given[key] = Value(value, unit, (value - Z_95 * sd, value + Z_95 * sd))
-    return Cause(form.kind, form.where, given, RIGHT * min(max(sure, 0.0), 1.0), rivals)
+    return Cause(form.kind, form.where, given, min(max(sure, 0.0), 1.0), rivals)
 
 
 def _wider(bench: Bench, term: Term, size: float, level: float) -> float:

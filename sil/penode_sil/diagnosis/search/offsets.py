@@ -26,7 +26,7 @@ from ..result import Cause, Named, Value
 from .propose import SMALL
 from .rounds import MIN_GAIN
 from .terms import Term
-from .worth import RIGHT, WORTH, Z_95, confounded, least, own_of_sensors, systematic
+from .worth import WORTH, Z_95, confounded, least, own_of_sensors, systematic
 
 Array = NDArray[np.float64]
 STARTS = 0.5  # values that other start states count for, where an explanation needs them
@@ -126,7 +126,7 @@ class _Offsets:
         offsets = [o for k, o in enumerate(self.found) if load is None or k in kept]
         alone = {p.name: Named(loads.KINDS[0], p.name) for _, p, _, rest in every if p is not None and not rest and load is None}
         causes = [
-            others.offset(o.sensor, Value(o.value, units.si(self._unit(o)), _interval(o.value, o.deviation)), RIGHT, tuple(alone.values()))
+            others.offset(o.sensor, Value(o.value, units.si(self._unit(o)), _interval(o.value, o.deviation)), 1.0, tuple(alone.values()))
             for o in offsets
         ]
         if load is None:
@@ -135,7 +135,7 @@ class _Offsets:
         deviation = abs(force) * max(o.deviation / abs(o.value) for o in gone)
         size = Value(-force, load.unit("N"), _interval(-force, deviation))
         alike = (*(Named(others.OFFSET, o.sensor) for o in gone), *inputs_alike(self.model, load))
-        return [loads.cause(load.name, size, RIGHT, alike), *causes]
+        return [loads.cause(load.name, size, 1.0, alike), *causes]
 
     def _explanations(self) -> Iterator[tuple[float, Place | None, float, tuple[int, ...]]]:
         """Cost, load and its force, and the offsets kept, of every explanation that leaves little."""

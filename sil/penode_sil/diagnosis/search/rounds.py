@@ -266,7 +266,7 @@ def _is_enough(part: Trial, t: Trial) -> bool:
 def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
     """Is a form enough better, with no block that it predicts worse by MIN_GAIN and by more than it gains on average, and a size that is
     not zero, nor a delay too short to be one, nor a limit that samples are beyond?"""
-    if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN and -np.min(better) < max(MIN_GAIN, np.mean(better))):
+    if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN and -np.min(better) < max(MIN_GAIN, float(np.mean(better)))):
         return False
     if t.form.how in late.HOW and t.fit.value(t.term.free[0].target) < late.SHORT * bench.step:
         return False

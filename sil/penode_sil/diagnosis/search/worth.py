@@ -21,8 +21,6 @@ from .terms import Term, drive, moves
 
 Array = NDArray[np.float64]
 WORTH = 0.07  # of the force there: less is a small deviation. Any model is 2 to 5 % wrong, a name is worth it from 10 % on; the middle
-# share of named causes that were right: 58 of 62 (make campaign-worlds, seed 20261206); others stand for what is not in the catalogue
-RIGHT = 0.93
 BENT = 0.6  # of a friction or a cube along a Gaussian motion is beside a straight line, in rms: sqrt(1 - 2/pi), sqrt(1 - 9/15)
 Z_95 = 1.96  # standard deviations that hold 95 %
 RATIO = 3.0  # times the unmodelled force that remains beside all causes: where that is little, a name is worth it from less on
