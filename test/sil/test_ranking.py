@@ -16,7 +16,7 @@ from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
 from penode_sil.diagnosis.evidence.prior import Stated
 from penode_sil.diagnosis.plant import plant
 from penode_sil.diagnosis.result import Cause, Value
-from penode_sil.diagnosis.search import propose, rounds
+from penode_sil.diagnosis.search import innovate, propose, rounds
 from penode_sil.diagnosis.search.terms import Term, Trial
 
 PLANT = """
@@ -143,3 +143,15 @@ def test_a_stop_stays_away_from_the_middle():
     place = SimpleNamespace(role="force", name="spring", ends=("body", "wheel"))
     gaps = [p for f in springs.forms(None, 0, place, Motion((), 0.01, 0.1, 0.04, 0.4)) if f.kind == "bump_stop" for p in f.parts]
     assert gaps and all(p.shapes["gap"][0] / p.span >= 0.15 * 0.04 for p in gaps)
+
+
+def test_of_several_small_forms_at_a_place_none_is_its_curve():
+    """A shaft with waves is a cube, a stop and two stiffnesses at once; a form that gains a tenth of another only makes up for it."""
+
+    def found(kind: str, gain: float, where: str = "shaft", index: int = 0) -> SimpleNamespace:
+        return SimpleNamespace(trial=SimpleNamespace(form=Form(kind, where, "force", index), gain=gain))
+
+    sides, stop = found("asymmetric_spring", 200.0), found("bump_stop", 380.0)
+    assert innovate._shares(sides, stop) and innovate._shares(stop, sides)
+    assert not innovate._shares(sides, sides) and not innovate._shares(sides, found("coulomb_friction", 600.0, "bearing", 1))
+    assert not innovate._shares(stop, found("cubic_spring", 38.0))

@@ -78,7 +78,8 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
 
 def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
     """The end of a search, with those forms large that have a name beside the unmodelled `level` that remains. One too small for that
-    counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it."""
+    counts by the error of a free run without it: the observer follows what changes slowly, so that innovations show little of it. Of
+    several small forms at a place none has a name: its curve is that of none of them."""
     bench, still = end.bench, Filter.none(*end.bench.fit.by.gain.shape)
     accepted, most = list(end.accepted), max((a.trial.gain for a in end.accepted), default=0.0)
     large = [
@@ -97,10 +98,15 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
         without = max((problem.solve(free, still, FREE_RUN) for free in starts), key=lambda f: f.cost)
         taken = without.taken_whole(whole, problem.floor)
         log(f"{name_of(a.trial)} explains {taken:.1%} of the error of a free run without it")
-        if mostly(taken):
+        if mostly(taken) and not any(_shares(a, x) for x in end.accepted):
             accepted[k] = replace(a, trial=replace(a.trial, whole=max(taken, a.trial.whole)))
             large[k] = a.trial.share >= _worth(a.trial, level, taken)
     return replace(end, accepted=tuple(accepted), large=tuple(large))
+
+
+def _shares(a: Accepted, other: Accepted) -> bool:
+    """Is it at the place of another form, which gained as much as one has to that is no more than what another one lacks?"""
+    return a is not other and a.trial.form.at == other.trial.form.at and other.trial.gain >= MIN_FORM * a.trial.gain
 
 
 def _is_required(t: Trial, level: float, followed: float, most: float) -> bool:

@@ -240,7 +240,7 @@ def like_the_file(trials: Sequence[Trial], base: Array) -> list[Trial]:
     """Trials, the best first, without those at the place of the best that are about as good (`margin`) as one there whose fit takes fewer
     values of the file away: one curve in two words, for a stop beside a spring that has gone is a play."""
     near = [t for t in trials if t.form.at == trials[0].form.at and np.sum(trials[0].blocks - t.blocks) <= margin(t, base)]
-    gone = [sum(isinstance(f, Stated) and mostly(abs(f.value - f.origin) / abs(f.origin)) for f in t.fit.free) for t in near]
+    gone = [sum(isinstance(f, Stated) and mostly(1.0 - f.value / f.origin) for f in t.fit.free) for t in near]
     return [t for t in trials if t not in near or gone[near.index(t)] == min(gone)]
 
 
