@@ -271,8 +271,8 @@ class Summed:
 
     scores: Callable[[Sequence[Accepted]], np.ndarray]
 
-    def beside(self, forms: Sequence[Accepted]) -> tuple[None, np.ndarray, Sequence[Accepted]]:
-        return None, self.scores(forms), forms
+    def score_without(self, grown: Grown, gone: Sequence[Accepted]) -> float:
+        return float(np.sum(self.scores([a for a in grown.accepted if a not in gone])))
 
     def log(self, text: str) -> None:
         pass

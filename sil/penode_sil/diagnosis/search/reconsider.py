@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -69,27 +69,23 @@ def needed(rounds: Rounds, grown: Grown) -> list[bool]:
     """Which forms have a name: the large ones, but for one that gains less than MIN_FORM of what another does at its place, input or
     sensor, each beside all others: the curve of that is not its textbook form, and the small one makes up for the difference. The least
     goes first, for of two that do the same each gains nothing beside the other."""
-    left, whole = list(grown.accepted), _total(grown)
+    gone: list[Accepted] = []
     large = [a for a, big in zip(grown.accepted, grown.large, strict=True) if big]
-    while True:
-        gains = {a: _gain(rounds, left, a, whole) for a in large if any(_beside(a, x) for x in large)}
+    while doubted := [a for a in large if any(_beside(a, x) for x in large)]:
+        whole = rounds.score_without(grown, gone)
+        gains = {a: whole - rounds.score_without(grown, [*gone, a]) for a in doubted}
         less = [a for a in gains if gains[a] <= MIN_FORM * max(gains[x] for x in gains if _beside(a, x))]
         if not less:
-            return [a in large for a in grown.accepted]
+            break
         least = min(less, key=lambda a: gains[a])
         rounds.log(f"{name_of(least.trial)} gains {gains[least]:.0f} nats beside the others: it makes up for them")
-        left, large = ([a for a in those if a is not least] for those in (left, large))
-        whole -= gains[least]
+        large, gone = [a for a in large if a is not least], [*gone, least]
+    return [a in large for a in grown.accepted]
 
 
 def _beside(a: Accepted, other: Accepted) -> bool:
     """Are they two forms at one place, or of one input or sensor?"""
     return a is not other and a.trial.form.at == other.trial.form.at
-
-
-def _gain(rounds: Rounds, accepted: Sequence[Accepted], a: Accepted, whole: float) -> float:
-    """What a form gains on held-out blocks beside all others [nats], of the score of the `whole`."""
-    return whole - float(np.sum(rounds.beside([x for x in accepted if x is not a])[1]))
 
 
 def _fitted_shapes(a: Accepted, values: Mapping[str, float]) -> Form:

@@ -21,7 +21,7 @@ from ..extend import late
 from . import clipping, holding
 from .adopting import adopt
 from .propose import FOLLOWED, PROMISE, is_part, motions, propose
-from .terms import Term, Trial
+from .terms import Term, Trial, without_any
 from .worth import WORTH, Z_95, alone, least, mostly, share, undetermined, wrong
 
 Array = NDArray[np.float64]
@@ -129,6 +129,14 @@ class Rounds:
         shares = [share(bench, terms, bench.fit, moved) for terms in same]
         found = [replace(a, trial=replace(a.trial, share=x)) for a, x in zip(found, shares, strict=True)]
         return *_based(bench, self.blocks), found
+
+    def score_without(self, grown: Grown, gone: Sequence[Accepted]) -> float:
+        """Score of all held-out blocks without some of the forms, the rest fitted again at the level that there is."""
+        own = {f.target for x in terms_of(gone) for f in x.free}
+        bench = grown.bench
+        problem = bench.problem(without_any(bench.model, terms_of(gone)))
+        fit = problem.solve([f for f in bench.fit.free if f.target not in own], bench.fit.by, FOLLOWED) if own else bench.fit
+        return float(np.sum(self.blocks.scores(problem, fit))) - stated(fit.free)
 
     def good(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> tuple[Trial, ...]:
         """Trials that predict left-out blocks better than `scores` by MIN_GAIN, the best first. If a large form predicts as well as the

@@ -132,6 +132,13 @@ def _values(name: str, part: Part, motion: Motion) -> Iterator[Free]:
             yield Free(f"{name}_{key}", value, value, log=True, sigma=1.0, origin=value, low=low, high=high)
 
 
+def without_any(model: Model, terms: Sequence[Term]) -> Model:
+    """The model in which terms that are not fitted have no force: in it gains are 0, and the size of a law that takes all of an element is
+    not."""
+    sizes = {f"{name}_{p.loose[0]}" for t in terms for name, p in zip(t.elements, t.form.parts, strict=True) if p.own}
+    return replace(model, parameters={n: replace(p, value=0.0) if n in sizes else p for n, p in model.parameters.items()})
+
+
 def whole(bench: Bench, t: Trial) -> Form | None:
     """The form of a trial with laws that take away all of an element, as a play in series with all of a spring does; None if it has others.
     Of a narrow play, only its gap times what it takes is seen, and that stays as it was fitted."""
