@@ -93,6 +93,13 @@ LAWS: dict[str, Law] = {
     ),
     # hysteresis of Dahl: ever softer after a reversal
     "dahl_friction": Law("force*slip", {"force": "N", "presliding": "m"}, {"slip": LawState("1", "(v - abs(v)*slip)/presliding")}),
+    # dry friction of bristles whose level falls with the rate (Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE TAC 40, 1995, eq. 1-6,
+    # without the damping of the bristles)
+    "lugre_friction": Law(
+        "force*slip",
+        {"force": "N", "presliding": "m", "rise": "1", "stribeck": "m/s"},
+        {"slip": LawState("1", "(v - abs(v)*slip/(1 + rise*exp(-(v/stribeck)^2)))/presliding")},
+    ),
     # the part of a dry friction that is there at low rates only, with the memory of Dahl's
     "falling_friction": Law(
         "force*slip/(1 + (v/stribeck)^2)",

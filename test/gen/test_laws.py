@@ -95,6 +95,10 @@ CASES: dict[str, tuple[dict[str, str], Law]] = {
     ),
     "bouc_wen": ({"force": "9 N", "presliding": "10 mm"}, bouc_wen),
     "dahl_friction": ({"force": "9 N", "presliding": "10 mm"}, lambda s, v, own: (9.0 * own[0], [(v - abs(v) * own[0]) / 0.01])),
+    "lugre_friction": (
+        {"force": "9 N", "presliding": "10 mm", "rise": "0.8", "stribeck": "0.3 m/s"},
+        lambda s, v, own: (9.0 * own[0], [(v - abs(v) * own[0] / (1.0 + 0.8 * np.exp(-((v / 0.3) ** 2)))) / 0.01]),
+    ),
     "falling_friction": (
         {"force": "9 N", "presliding": "10 mm", "stribeck": "100 mm/s"},
         lambda s, v, own: (9.0 * own[0] / (1.0 + (v / 0.1) ** 2), [(v - abs(v) * own[0]) / 0.01]),

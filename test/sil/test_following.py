@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""An observer that does not follow, a neighbour of a fit that diverges, a block that is against a form."""
+"""An observer that does not follow, a neighbour of a fit that diverges, a block that is against a form, steps that laws ask for."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import pytest
 from curves import integrate
 
 import penode_gen
+from penode_sil.diagnosis.catalogue import memory
 from penode_sil.diagnosis.evidence.bench import build, with_tolerances
 from penode_sil.diagnosis.evidence.fit import _log_determinant
-from penode_sil.diagnosis.evidence.observer import Record, sample_noise
+from penode_sil.diagnosis.evidence.observer import Predictor, Record, augmented, sample_noise
 from penode_sil.diagnosis.plant import plant
 from penode_sil.diagnosis.search import rounds
 from penode_sil.diagnosis.study import driven
@@ -116,3 +117,49 @@ def test_no_block_is_against_a_form_by_more_than_blocks_are_for_it(better, accep
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rounds, "undetermined", lambda model, fit: ())
         assert rounds._accepted(rig, trial, np.array(better)) == accepted
+
+
+BRUSH = """
+[model]
+name = "brush"
+sample_time = "2 ms"
+[parameters]
+m = { value = 1.0, unit = "kg", tolerance = 0.05 }
+[inputs]
+F = { unit = "N" }
+[bodies]
+slide = { mass = "m", position = "x", velocity = "v" }
+[elements]
+push = { between = ["slide", "ground"], law = "expression", force = "-F" }
+rail = { between = ["slide", "ground"], LAW }
+[outputs]
+x = { value = "x", unit = "m" }
+[sensors]
+x = { value = "x", unit = "m", noise = 1e-5 }
+"""
+
+
+@pytest.mark.parametrize(
+    "law, steps",
+    [
+        ('law = "linear_damper", damping = "4 N*s/m"', 1),
+        ('law = "coulomb_friction", force = "2 N", transition = "5 mm/s"', 4),
+        ('law = "bouc_wen", force = "2 N", presliding = "0.2 mm"', 8),
+        ('law = "lugre_friction", force = "2 N", presliding = "0.2 mm", rise = "0.5", stribeck = "10 mm/s"', 8),
+    ],
+)
+def test_a_fit_takes_the_steps_that_its_laws_ask_for(tmp_path, law, steps):
+    """Of a sample of 2 ms; longer ones gave half of the likelihood of a friction with bristles, and other causes had the credit."""
+    (tmp_path / "model.toml").write_text(BRUSH.replace("LAW", law))
+    model = penode_gen.load(tmp_path / "model.toml")
+    record = Record("r", 0.002, np.zeros((100, 1)), np.zeros((100, 1)), smooth=False)
+    assert Predictor(augmented(model), [record], 5).steps == 100 * steps
+
+
+def test_bristles_that_bend_in_less_than_a_sample_have_a_finite_force():
+    """0.2 m/s are 20 presliding ways in a sample of 10 ms; the force is between the level at speed and the breakaway."""
+    s = 0.05 * np.sin(4.0 * np.arange(0.0, 4.0, 0.01))
+    found = memory.force("lugre_friction", {"force": 1.0, "presliding": 1e-4, "rise": 0.5, "stribeck": 0.01}, s, 0.01)
+    assert np.isfinite(found).all() and np.max(np.abs(found)) < 1.5
+    fast = np.abs(np.gradient(s, 0.01)) > 0.1
+    assert np.median(np.abs(found[fast])) == pytest.approx(1.0, abs=1e-3)

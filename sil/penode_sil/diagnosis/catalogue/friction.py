@@ -56,6 +56,7 @@ EDGES, SPAN = (
 )  # of the rms rate: transitions of a friction, within that factor; smooth enough for Gauss-Newton, steep enough for any motion
 WIDEST = EDGES[-1] * SPAN  # what bends slower is a damper
 PEAKS = (0.1, 0.4)  # of the rms rate: where a friction has fallen from its breakaway
+LUGRE = "with bristles that slip sooner at speed"
 WAYS = (0.06, 0.25, 0.8)  # of the rms deflection: how far a hysteresis is bent before it slides
 
 
@@ -105,6 +106,8 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         yield Form(KINDS[2], place.loss, "force", index, (bends,))
         for width in PEAKS if share < WAYS[-1] else ():
             yield Form(KINDS[1], place.loss, "force", index, (bends, peak(motion, width)), "with bristles")
+            shapes = {**bends.shapes, "rise": (1.0, "1"), "stribeck": (width * motion.v_rms, "m/s")}
+            yield Form(KINDS[1], place.loss, "force", index, (Part("lugre_friction", ("force", "N"), shapes, 1),), LUGRE)
 
 
 def _growing(motion: Motion, edge: float) -> Iterable[tuple[Part, str, str]]:
@@ -122,6 +125,9 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
         return {"share": ("1", v(0, "share"))}
     force = ("N", v(0, "force"))
     match form.kind:
+        case "stribeck_friction" if form.note == LUGRE:
+            breakaway = v(0, "force") * (1.0 + v(0, "rise"))
+            return {"breakaway": ("N", breakaway), "coulomb": force, "stribeck_rate": ("m/s", v(0, "stribeck"))}
         case "stribeck_friction":
             return {"breakaway": ("N", v(0, "force") + v(1, "rise")), "coulomb": force, "stribeck_rate": ("m/s", v(1, "width"))}
         case "bouc_wen":

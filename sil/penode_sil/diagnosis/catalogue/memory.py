@@ -47,7 +47,8 @@ def force(law: str, values: Mapping[str, float], s: Array, step: float) -> Array
     """Force [n] of a law between ends that move apart by s [n], `step` [s] apart, from rest at s[0]. A call costs one simulation."""
     parameters = {f"p_{k}": np.array([v]) for k, v in values.items()}
     period = 2.0 * np.pi * float(np.std(s)) / max(float(np.std(np.diff(s))), 1e-300)  # of the motion, in samples
-    substeps = 2 ** max(0, int(np.ceil(np.log2(PERIOD / max(period, 1.0))))) if np.isfinite(period) else 1
+    ways = float(np.max(np.abs(np.diff(s)), initial=0.0)) / values.get("presliding", np.inf)  # in a sample; bristles bend back in one
+    substeps = 2 ** max(0, int(np.ceil(np.log2(max(PERIOD / max(period, 1.0), ways, 1.0))))) if np.isfinite(period) else 1
     return _batch(law, step, substeps).run((s - s[0])[:, None], parameters=parameters, outputs=("force",)).y[0, :, 0]
 
 

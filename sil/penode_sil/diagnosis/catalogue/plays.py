@@ -33,7 +33,8 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         shapes = {"gap": (gap, "m"), "relaxation": (max(2e-3, 2.0 * motion.parts[0].step), "s")}
         loose = Part("loose_damper", ("damping", "N*s/m"), shapes, 1, takes="linear_damper")
         yield Form(KINDS[0], place.name, "force", index, (loose,), "of a damper")
-    if not model.bodies:  # a play shows in series with friction where no mass is in between
+    rubs = any({*e.ends} == {*place.ends} and ("friction" in e.law or e.law == "bouc_wen") for e in model.elements)
+    if rubs and not model.bodies:  # a play shows in series with friction where no mass is in between
         for share in GAPS:
             way = share * motion.s_rms
             slack = Part("slack_friction", ("force", "N"), {"presliding": (way, "m")}, 1)

@@ -16,7 +16,7 @@ from penode_gen.model import GROUND, Element, Equation, Input, Model, Parameter,
 from ...batch import Batch, Observer
 from ..catalogue.actuators import ACTUATORS
 from ..plant.between import far, finer, joined, straight
-from ..plant.compiling import compiled, ordered
+from ..plant.compiling import compiled, longest, ordered
 from ..plant.plant import Place, anonymous, extend, external, rotational_unit
 from ..study.fit import Free
 from ..study.noise import Experiment
@@ -170,7 +170,8 @@ class Predictor:
         smooth = bool(model.inputs) and all(r.smooth for r in records) and far(model.sample_time, [r.u for r in records])
         self.fine = (3 if moves else 2) if smooth else 1  # samples of an input in one of a recording, see `between`
         step = model.sample_time / self.fine
-        substeps = max(1, int(np.ceil(step * fastest / MAX_TURN)), -(-MIN_STEPS // (update * self.fine)), -(-model.substeps // self.fine))
+        least = -(-MIN_STEPS // (update * self.fine)), -(-model.substeps // self.fine)
+        substeps = max(1, int(np.ceil(step * fastest / MAX_TURN)), int(np.ceil(0.999 * step / longest(model))), *least)
         way = "linear" if smooth else "cubic" if moves else "held" if any(r.held for r in records) else "linear"
         self._causal = causal
         self.batch = compiled(anonymous(replace(model, method="rk4", interpolation=way, substeps=substeps, sample_time=step)), causal)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 import penode_gen
 from penode_gen.model import INTERPOLATIONS, Model
 
+from ..plant.compiling import longest
 from ..study.restoring import rms
 from ..study.study import Study
 from .measuring import deployed, started
@@ -33,7 +34,8 @@ def resolved(study: Study, text: str) -> tuple[str, Model]:
     scale = np.sqrt(np.mean(study.levels[0], axis=0))
 
     def left(z: Array) -> float:
-        return rms(((z - e.y) * e.good / scale).ravel())
+        missed = rms(((z - e.y) * e.good / scale).ravel())
+        return missed if np.isfinite(missed) else np.inf
 
     stepped = deployed(model, e, start, study.set_name)
     ways = INTERPOLATIONS[INTERPOLATIONS.index(model.interpolation) + 1 :] if model.interpolation != "held" else ()
@@ -49,9 +51,11 @@ def resolved(study: Study, text: str) -> tuple[str, Model]:
     while substeps <= 1000 and left(stepped) > (1.0 + ROUGH) * left(exact):  # what a model file may have
         better = _with(text, "substeps", str(substeps))
         finer = deployed(_load(better), e, start, study.set_name)
-        if left(finer) >= left(stepped):
+        if left(finer) < left(stepped):
+            text, stepped = better, finer
+        elif substeps * longest(model) >= model.sample_time:  # else a law that follows short ways may still diverge
             break
-        text, stepped, substeps = better, finer, 2 * substeps
+        substeps *= 2
     return text, _load(text)
 
 
