@@ -104,6 +104,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     for share in WAYS:
         bends = Part("bouc_wen", ("force", "N"), {"presliding": (share * motion.s_rms, "m")}, 1)
         yield Form(KINDS[2], place.loss, "force", index, (bends,))
+        yield Form(KINDS[2], place.loss, "force", index, (replace(bends, law="dahl_friction"),), "of Dahl")
         for width in PEAKS if share < WAYS[-1] else ():
             yield Form(KINDS[1], place.loss, "force", index, (bends, peak(motion, width)), "with bristles")
             shapes = {**bends.shapes, "rise": (1.0, "1"), "stribeck": (width * motion.v_rms, "m/s")}
