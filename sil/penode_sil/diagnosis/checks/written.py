@@ -10,7 +10,7 @@ from pathlib import Path
 import penode_gen
 from penode_gen.model import Model
 
-from ..extend.entries import extends, toml
+from ..extend.entries import extends, head
 from ..result import EXTENDED
 from .case import Case
 
@@ -31,16 +31,7 @@ def write_extended(text: str, case: Case) -> Model:
 
 def heading(model: Model, learnt: str) -> list[str]:
     """The first lines of a model file that extends another one by what was learnt, down to its parameters."""
-    return [
-        f"# Extension of {model.path.name} from recordings: {learnt}.",
-        "",
-        "[model]",
-        extends(model.path.resolve()),
-        f"name = {toml(model.name + '_extended')}",
-        f"sample_time = {toml(f'{model.sample_time:.12g} s')}",
-        "",
-        "[parameters]",
-    ]
+    return [*head(model, learnt), "[parameters]"]
 
 
 def joined(base: str, text: str) -> str:

@@ -21,7 +21,7 @@ from ..plant.plant import extend
 from ..search import clipping
 from ..search.terms import Term
 from . import late
-from .entries import extends, table, toml, unlike
+from .entries import head, table, toml, unlike
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,8 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
     ]
     outputs += [x for x in moved["outputs"] if x.split(" = ")[0] not in {o.split(" = ")[0] for o in outputs}]
     substeps = max((late.substeps(d, model.sample_time) for _, d in delays.values()), default=1)
-    lines = _head(model, terms, substeps)
+    learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
+    lines = head(model, learnt or "values only", substeps)
     for title, entries in (
         ("parameters", [*parameters, *driven.parameters]),
         ("actuators", driven.actuators),
@@ -87,21 +88,6 @@ def apply(model: Model, bench: Bench, fit: Fit, terms: Sequence[Term], offsets: 
         if entries:
             lines += [f"[{title}]", *entries, ""]
     return Applied("\n".join(lines), tuple(driven.left))
-
-
-def _head(model: Model, terms: Sequence[Term], substeps: int) -> list[str]:
-    """Lines of a file that extends the model's, down to the end of [model]."""
-    learnt = ", ".join(dict.fromkeys(f"{t.form.kind} at {t.form.where}" for t in terms))
-    return [
-        f"# Extension of {model.path.name} from recordings: {learnt or 'values only'}.",
-        "",
-        "[model]",
-        extends(model.path.resolve()),
-        f"name = {toml(model.name + '_extended')}",
-        f"sample_time = {toml(f'{model.sample_time:.12g} s')}",
-        *[f"substeps = {substeps}"] * (substeps > model.substeps),
-        "",
-    ]
 
 
 def _forces(

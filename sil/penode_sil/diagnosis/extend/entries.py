@@ -8,6 +8,8 @@ from collections.abc import Collection, Mapping
 from itertools import chain, count
 from pathlib import Path
 
+from penode_gen.model import Model
+
 
 def table(values: Mapping[str, object]) -> str:
     """An inline table."""
@@ -35,3 +37,17 @@ def unlike(stem: str, taken: Collection[str]) -> str:
 def extends(path: Path) -> str:
     """The line that names the nominal model file."""
     return f"extends = {toml(path.as_posix())}"
+
+
+def head(model: Model, learnt: str, substeps: int = 1) -> list[str]:
+    """The first lines of a model file that extends another one by what was `learnt`, down to the end of [model]."""
+    return [
+        f"# Extension of {model.path.name} from recordings: {learnt}.",
+        "",
+        "[model]",
+        extends(model.path.resolve()),
+        f"name = {toml(model.name + '_extended')}",
+        f"sample_time = {toml(f'{model.sample_time:.12g} s')}",
+        *[f"substeps = {substeps}"] * (substeps > model.substeps),
+        "",
+    ]
