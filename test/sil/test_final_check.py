@@ -22,7 +22,7 @@ from penode_sil.diagnosis.checks.case import Case, End
 from penode_sil.diagnosis.checks.differing import common
 from penode_sil.diagnosis.checks.written import write_extended
 from penode_sil.diagnosis.extend.entries import extends
-from penode_sil.diagnosis.result import Cause, Diagnosis, Gain, Value
+from penode_sil.diagnosis.result import UNKNOWN, Cause, Diagnosis, Gain, Value
 from penode_sil.diagnosis.study import study
 from penode_sil.diagnosis.study.driven import experiment
 from penode_sil.recordings.measured import load
@@ -247,6 +247,14 @@ def test_a_high_pass_of_a_sensor_is_no_agreement(tmp_path):
     end = End(Diagnosis("no_discrepancy", (), {}, {}, 1.0, 0.0, 0.0), one, write_extended(same, case), None, [])
     found = final.checked(case, end)
     assert found.verdict == "not_identifiable" and found.notes[0].startswith("speed (0.")
+    unknown = Diagnosis("unexplained", (UNKNOWN,), {}, {}, 0.0, 0.0, 0.0)  # nor is it an effect without a name
+    found = final.checked(case, replace(end, answer=unknown))
+    assert found.verdict == "not_identifiable" and found.causes == ()
+    rubbing = load([record(tmp_path / "more.csv", 1, False, 1.0, MASS, 0.3)], nominal)  # of which a high-pass explains a part
+    one = study.begin(nominal, [experiment(m, nominal) for m in rubbing])
+    one = study.replace(one, seen=study.look(one, one.null))
+    found = final.checked(replace(case, train=rubbing), replace(end, answer=unknown, study=one))
+    assert found.verdict == "unexplained"
 
 
 @pytest.mark.parametrize("stiffness, law, within", [(1.019, "", True), (1.021, "", False), (1.019, "quadratic_damper", False)])

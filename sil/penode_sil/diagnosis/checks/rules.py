@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 from scipy.signal import butter, lfilter
 
 from penode_gen.model import Model
 
 from ...compared import REJECTED, rejected, worsened
+from ...predicted import Predicted
 from .. import catalogue
 from ..catalogue import drives, values as of_values
 from ..catalogue.friction import turns
@@ -209,17 +211,28 @@ def unexplained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> E
 
 
 def coupled(case: Case, end: End, table: Table) -> list[tuple[str, float]]:
-    """Sensors that a model without discrepancy misses by more than noise, as a high-pass explains better than the written one; and its
-    corner [Hz]."""
+    """Sensors that a model without a name for anything misses by more than noise, as a high-pass explains better than the written one, and
+    to the noise where something is unexplained; and its corner [Hz]."""
     found: dict[str, float] = {}
-    for r in _missed(table) if end.answer.verdict == "no_discrepancy" else ():
-        predicted = table.predicted[r.figure.recording][0]
-        step = case.model.sample_time
-        corners = np.geomspace(1.0 / np.ptp(predicted.time), 0.1 / step, 40)
-        left = [r.rms_of(predicted.time, _high_pass(predicted.z[:, r.sensor], f * step)) for f in corners]
-        if UNSEEN * min(left) < min(map(r.rms, (*NOMINAL, "extended"))):
-            found[r.figure.signal] = float(corners[int(np.argmin(left))])
+    verdict = end.answer.verdict
+    for r in _missed(table) if verdict == "no_discrepancy" or (verdict == "unexplained" and not _named(end)) else ():
+        corner, left = _best_corner(r, table.predicted[r.figure.recording][0], case.model.sample_time)
+        noise = verdict == "no_discrepancy" or left < UNSEEN * table.noise[r.sensor]
+        if noise and UNSEEN * left < min(map(r.rms, (*NOMINAL, "extended"))):
+            found[r.figure.signal] = corner
     return list(found.items())
+
+
+def _best_corner(r: Row, predicted: Predicted, step: float) -> tuple[float, float]:
+    """Corner [Hz] of the high-pass behind which a prediction is nearest to a sensor, and its error."""
+
+    def left(log_corner: float) -> float:
+        return r.rms_of(predicted.time, _high_pass(predicted.z[:, r.sensor], float(np.exp(log_corner)) * step))
+
+    corners = np.linspace(-np.log(np.ptp(predicted.time)), np.log(0.1 / step), 40)
+    k = int(np.clip(np.argmin([left(c) for c in corners]), 1, len(corners) - 2))
+    best = minimize_scalar(left, bounds=(corners[k - 1], corners[k + 1]), method="bounded")
+    return float(np.exp(best.x)), float(best.fun)
 
 
 def _high_pass(x: np.ndarray, corner: float) -> np.ndarray:
@@ -232,7 +245,7 @@ def unsure(case: Case, end: End, table: Table, sensors: Sequence[tuple[str, floa
     d = end.answer
     corners = ", ".join(f"{name} ({corner:.2g} Hz)" for name, corner in sensors)
     note = f"{corners}: off by more than noise, as behind a high-pass: is the sensor AC-coupled, as piezoelectric ones are?"
-    return replace(end, answer=replace(d, verdict="not_identifiable", notes=(note, *d.notes)))
+    return replace(end, answer=replace(d, verdict="not_identifiable", causes=tuple(end.faults), notes=(note, *d.notes)))
 
 
 def worse(case: Case, end: End, table: Table) -> list[str]:
