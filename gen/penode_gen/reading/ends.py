@@ -42,13 +42,11 @@ class EndTables(NetworkTables):
                 self.problem(where, f"'{text}' is in {parameters[text].unit}, needed is {unit}", "use a parameter of that unit")
             return text
         value = self.quantity(where, text, unit)
-        if new in parameters and self.extended(("parameters", new), where) and same(parameters[new].unit, unit):
-            pass
-        elif new in parameters:
-            self.problem(where, f"this quantity would become the parameter '{new}', which there is already", "name that one, or rename it")
-        else:
+        if new not in parameters:
             parameters[new] = m.Parameter(new, value, unit, description=f"{key} of {where[1]}")
             self.made[new] = where
+        elif not (self.extended(("parameters", new), where) and same(parameters[new].unit, unit)):
+            self.problem(where, f"this quantity would become the parameter '{new}', which there is already", "name that one, or rename it")
         return new
 
     # -- what moves -----------------------------------------------------------------------------------------------

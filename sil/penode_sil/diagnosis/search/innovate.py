@@ -14,7 +14,7 @@ from ..evidence.blocks import BLOCKS, Blocks
 from ..evidence.fit import Fit
 from ..evidence.observer import Filter, bias
 from .propose import FREE_RUN
-from .reconsider import centred, needed, reconsidered
+from .reconsider import at_one_place, centred, needed, reconsidered
 from .rounds import LEVEL_FACTORS, MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, is_large, name_of, terms_of
 from .terms import Term, Trial
 from .worth import RATIO, Z_95, least, mostly, remaining
@@ -106,7 +106,7 @@ def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:
 
 def _shares(a: Accepted, other: Accepted) -> bool:
     """Is it at the place of another form, which gained as much as one has to that is no more than what another one lacks?"""
-    return a is not other and a.trial.form.at == other.trial.form.at and other.trial.gain >= MIN_FORM * a.trial.gain
+    return at_one_place(a, other) and other.trial.gain >= MIN_FORM * a.trial.gain
 
 
 def _is_required(t: Trial, level: float, followed: float, most: float) -> bool:

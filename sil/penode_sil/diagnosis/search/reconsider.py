@@ -70,20 +70,21 @@ def needed(rounds: Rounds, grown: Grown) -> list[bool]:
     sensor, each beside all others: the curve of that is not its textbook form, and the small one makes up for the difference. The least
     goes first, for of two that do the same each gains nothing beside the other."""
     gone: list[Accepted] = []
+    left = 0.0  # score without those
     large = [a for a, big in zip(grown.accepted, grown.large, strict=True) if big]
-    while doubted := [a for a in large if any(_beside(a, x) for x in large)]:
-        whole = rounds.score_without(grown, gone)
+    while doubted := [a for a in large if any(at_one_place(a, x) for x in large)]:
+        whole = left if gone else rounds.score_without(grown, gone)
         gains = {a: whole - rounds.score_without(grown, [*gone, a]) for a in doubted}
-        less = [a for a in gains if gains[a] <= MIN_FORM * max(gains[x] for x in gains if _beside(a, x))]
+        less = [a for a in gains if gains[a] <= MIN_FORM * max(gains[x] for x in gains if at_one_place(a, x))]
         if not less:
             break
         least = min(less, key=lambda a: gains[a])
         rounds.log(f"{name_of(least.trial)} gains {gains[least]:.0f} nats beside the others: it makes up for them")
-        large, gone = [a for a in large if a is not least], [*gone, least]
+        large, gone, left = [a for a in large if a is not least], [*gone, least], whole - gains[least]
     return [a in large for a in grown.accepted]
 
 
-def _beside(a: Accepted, other: Accepted) -> bool:
+def at_one_place(a: Accepted, other: Accepted) -> bool:
     """Are they two forms at one place, or of one input or sensor?"""
     return a is not other and a.trial.form.at == other.trial.form.at
 
