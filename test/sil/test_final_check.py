@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -268,3 +269,22 @@ def test_values_within_tolerances_are_what_the_file_allows(tmp_path, stiffness, 
     if law:
         written = replace(written, elements=(*written.elements, replace(written.elements[0], name="more", law=law)))
     assert rules.allowed(case, End(None, None, written, None, [])) is within
+
+
+@pytest.mark.parametrize(("second", "withdrawn"), [(0.3, False), (1.0, True), (0.03, False), (0.9, True)])
+def test_names_are_withdrawn_where_the_hold_out_as_a_whole_is_predicted_worse(second, withdrawn):
+    """One sensor is off 1.2 times as much with the cause as without it: what another one gains may outweigh that, 0.83 times its error or
+    less; and what is gained below the noise counts for nothing."""
+    errors = {"training": ((1.0, 0.1), (1.0, 0.1)), "hold-out": ((1.0, 1.2), (1.0, second))}
+    noise = np.array([0.05, 0.05])
+    rows = [row(role, j, *pair) for role, pairs in errors.items() for j, pair in enumerate(pairs)]
+    table = SimpleNamespace(rows=rows, noise=noise, of=lambda role: [r for r in rows if r.figure.role == role])
+    end = SimpleNamespace(answer=SimpleNamespace(causes=(Cause("bump_stop", "spring", {}, 0.9),)), faults=())
+    case = SimpleNamespace(holdout=("far.csv",))
+    assert rules.misled(case, end, table) == (["way"] if withdrawn else [])
+
+
+def row(role, sensor, nominal, extended):
+    """A row of the table with these errors of the two models."""
+    figure = SimpleNamespace(role=role, signal=("way", "speed")[sensor])
+    return SimpleNamespace(sensor=sensor, figure=figure, rms={"nominal": nominal, "extended": extended}.get)

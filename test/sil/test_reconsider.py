@@ -29,6 +29,7 @@ NAMES = {
     "constant": "constant_force",
     "cubic": "cubic_spring",
     "stop": "bump_stop",
+    "square": "quadratic_damper",
     "both": "coulomb_friction",
 }
 VALUES = {"stribeck": 3, "degressive": 2, "stop": 2, "both": 2}
@@ -77,10 +78,11 @@ class Rounds:
         return grown(list(map(filled, self.more(list(forms)))), self.scores)
 
 
-def grown(forms: Sequence[Accepted], scores: dict[tuple[str, ...], float], rest: Sequence[Trial] = ()) -> Grown:
-    """An end of a search. Good trials are left only where the last form is small, for the search goes on after a large one."""
+def grown(forms: Sequence[Accepted], scores: dict[tuple[str, ...], float], rest: Sequence[Trial] = (), left: float = 0.0) -> Grown:
+    """An end of a search that `left` a share of all forces unmodelled. Good trials are left only where the last form is small, for the
+    search goes on after a large one."""
     large = (*[True] * (len(forms) - 1), not rest)
-    return Grown(None, np.full(4, scores[kinds(forms)] / 4.0), tuple(forms), large, tuple(rest))
+    return Grown(SimpleNamespace(level=Level(left, 0.01)), np.full(4, scores[kinds(forms)] / 4.0), tuple(forms), large, tuple(rest))
 
 
 def test_a_first_choice_that_stood_in_for_two_is_exchanged():
@@ -134,6 +136,19 @@ def test_a_shape_chosen_before_the_others_were_known_goes_and_the_last_choice_wi
     }
     end = reconsidered(Rounds(scores, good), grown([first, second], scores))
     assert kinds(end.accepted) == ("coulomb_friction", "cubic_spring")
+
+
+@pytest.mark.parametrize(("left", "gain", "kept"), [(0.03, 31.0, False), (0.03, 29.0, True), (0.0, 31.0, True)])
+def test_a_search_begins_with_other_curves_too_where_forces_remain(left, gain, kept):
+    """A constant force predicts as well as an asymmetric spring, and leaves no room for it; beside the spring, a stop predicts the rest.
+    Two laws more have to gain MIN_GAIN each, and as much as one end has to beyond another."""
+    constant, spring, cubic = trial("constant", 600.0), trial("asymmetric", 595.0), trial("cubic", 480.0)  # below MIN_FORM of the gain: 500
+    first = replace(constant, gain=500.0)
+    scores = {("constant_force",): 600.0, ("asymmetric_damper", "bump_stop", "quadratic_damper"): 600.0 + gain}
+    more = [accepted(1, trial("stop", 620.0)), accepted(2, trial("square", 640.0))]
+    rounds = Rounds(scores, {}, grow=lambda forms: [*forms, *more])
+    end = reconsidered(rounds, grown([accepted(0, first, [spring, cubic])], scores, left=left))
+    assert kinds(end.accepted) == (("constant_force",) if kept else ("asymmetric_damper", "bump_stop", "quadratic_damper"))
 
 
 def test_no_simpler_form_that_predicts_much_worse_and_no_end_that_is_worse():

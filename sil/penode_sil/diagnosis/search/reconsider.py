@@ -21,20 +21,42 @@ from .worth import Z_95, mostly, wrong
 
 
 def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
-    """Returns the end of a search, or a better one (floating search; Pudil, Novovicova and Kittler 1994). For each form of two laws, such
-    as a friction with a constant, it also tries the best single law instead, and searches on from there."""
+    """Returns the end of a search, or a better one (floating search; Pudil, Novovicova and Kittler 1994). Where forces remain unmodelled,
+    it also begins with the best forms of other curves. For each form of two laws, such as a friction with a constant, it also tries the
+    best single law instead, and searches on from there."""
     best = _exchanged(rounds, grown)
+    for first in _other_beginnings(grown) if best.bench.level.size > 0.0 else ():
+        other = _exchanged(rounds, rounds.grow([first]))
+        rounds.log(f"beginning with {name_of(first.trial)}: {_total(other) - _total(best):.0f} nats")
+        if _total(other) - _total(best) > MIN_GAIN * (1 + _more(other, best)):
+            best = other
     for k, a in enumerate(best.accepted):
         single = [t for t in a.trials if len(t.form.kinds) == 1]
         if len(a.trial.form.kinds) > 1 and single:
             first = Accepted(max(single, key=_score), a.number, (), a.trials)
             other = _exchanged(rounds, rounds.grow([*best.accepted[:k], first]))
-            more = max(len(terms_of(other.accepted)) - len(terms_of(best.accepted)), 0)
             gain = _total(other) - _total(best)
             rounds.log(f"replacing the two-law form {name_of(a.trial)} by {[name_of(x.trial) for x in other.accepted]}: {gain:.0f} nats")
-            if gain > MIN_GAIN * (1 + more):
+            if gain > MIN_GAIN * (1 + _more(other, best)):
                 return other
     return best
+
+
+def _other_beginnings(grown: Grown) -> list[Accepted]:
+    """Of every other curve than that of the first accepted form, the best form that predicts about as well alone: it may be what is there,
+    and the first one, with others beside, what makes up for it."""
+    found: dict[object, Accepted] = {}
+    for first in grown.accepted[:1]:
+        enough = _score(first.trial) - max(MIN_GAIN, MIN_FORM * first.trial.gain)
+        for t in first.trials:
+            if of_curve(t) != of_curve(first.trial) and not is_part(first.trial.form, t.form) and _score(t) >= enough:
+                found.setdefault(of_curve(t), Accepted(t, first.number, (), first.trials))
+    return list(found.values())
+
+
+def _more(end: Grown, other: Grown) -> int:
+    """How many laws more than another end has one?"""
+    return max(len(terms_of(end.accepted)) - len(terms_of(other.accepted)), 0)
 
 
 def centred(rounds: Rounds, grown: Grown) -> Grown:
