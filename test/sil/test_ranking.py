@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import penode_gen
-from penode_sil.diagnosis.catalogue import springs
+from penode_sil.diagnosis import catalogue
+from penode_sil.diagnosis.catalogue import friction, springs
 from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
 from penode_sil.diagnosis.evidence.prior import Stated
 from penode_sil.diagnosis.plant import plant
@@ -124,6 +125,34 @@ def test_friction_is_named_at_the_damper_of_its_place(tmp_path, law, name):
     (tmp_path / "model.toml").write_text(PLANT.replace("LAW", law))
     place, *free = plant.places(penode_gen.load(tmp_path / "model.toml"))
     assert (place.name, place.loss) == ("coil", name) and [p.loss for p in free] == ["body", "wheel"]
+
+
+@pytest.mark.parametrize(
+    ("note", "rise", "presliding", "kind"),
+    [
+        (friction.LUGRE, 0.05, 1e-5, "stribeck_friction"),
+        (friction.LUGRE, 0.03, 1e-5, "coulomb_friction"),
+        (friction.LUGRE, 0.03, 5e-5, "bouc_wen"),
+        ("with bristles", 0.05, 5e-5, "stribeck_friction"),
+        ("with bristles", 0.03, 1e-5, "coulomb_friction"),
+        ("of Dahl", 0.0, 5e-5, "bouc_wen"),
+        ("of Dahl", 0.0, 3e-5, "coulomb_friction"),
+    ],
+)
+def test_a_friction_is_called_by_what_its_fit_has(note, rise, presliding, kind):
+    """Along a motion of 1 mm rms: a peak below 4 % is none, and a presliding below 4 % of the motion is the contact of a friction."""
+    shapes = {"presliding": (presliding, "m"), "rise": (rise, "1"), "stribeck": (0.01, "m/s")}
+    laws = [(10.0, Part("a law", ("force", "N"), shapes)), (10.0 * rise, Part("a peak", ("rise", "N")))]
+    guess = "bouc_wen" if note == "of Dahl" else "stribeck_friction"
+    form = Form(guess, "damper", "force", 0, tuple(part for _, part in laws), note)
+    assert catalogue.fitted(form, laws, Motion((), 1e-3, 0.1, 2e-3, 0.2)).kind == kind
+
+
+def test_what_a_law_includes_is_a_part_of_it():
+    parts = Part("dahl", ("force", "N")), Part("lugre", ("force", "N"), includes="dahl")
+    slides, lugre = (Form("coulomb_friction", "damper", "force", 0, (p,)) for p in parts)
+    assert propose.is_part(slides, lugre)
+    assert not propose.is_part(lugre, slides) and not propose.is_part(lugre, lugre)
 
 
 def test_what_is_a_part_of_a_form_is_tried_too():

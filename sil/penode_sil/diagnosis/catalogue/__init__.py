@@ -2,7 +2,8 @@
 # Copyright (c) 2026 the penode authors
 """The causes that a diagnosis knows: one file for a kind, or for kinds of one curve. A new one is a file and its name here."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from penode_gen.model import Model
 
@@ -23,7 +24,7 @@ from . import (
     springs,
     tyres,
 )
-from .form import Form
+from .form import Form, Motion, Part
 
 FILES = (friction, springs, plays, dampers, bushings, masses, loads, tyres, aerated, lines, networks)
 MEANING = {kind: text for file in (*FILES, drives, channels, others) for kind, text in file.MEANING.items()}
@@ -51,6 +52,12 @@ def aside(form: Form) -> Form | None:
     """A form with its middle elsewhere; None where its kind has none."""
     shifted = getattr(OF.get(form.kind), "aside", None)
     return shifted(form) if shifted else None
+
+
+def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> Form:
+    """A form under the name that it has with its laws as they are fitted: a friction with hardly a peak is none of Stribeck's."""
+    named = getattr(OF[form.kind], "fitted", None)
+    return replace(form, kind=named(form, laws, motion)) if named else form
 
 
 def stem(kind: str) -> str:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -78,13 +78,13 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies
-    it, with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values. A shape
-    stays within a factor of `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a
-    jump, and may become as small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where that is another
-    cause. `load`: the expression whose magnitude an expression calls `load`. `takes`: the law of linear elements that it takes a share of;
-    `own`: the parameter of such an element, and its value in the file, where it takes all of it: that is its gain, and the first free shape
-    its size."""
+    """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies it,
+    with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values. A shape stays
+    within a factor of `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a jump,
+    and may become as small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where that is another cause.
+    `load`: the expression whose magnitude an expression calls `load`. `includes`: a law that it has the curve of too. `takes`: the law of
+    linear elements that it takes a share of; `own`: the parameter of such an element, and its value in the file, where it takes all of it:
+    that is its gain, and the first free shape its size."""
 
     law: str
     gain: tuple[str, str]
@@ -95,6 +95,7 @@ class Part:
     edge: str = ""
     kind: str = ""
     load: str = ""
+    includes: str = ""
     takes: str = ""
     own: tuple[str, float] | None = None
 
@@ -176,6 +177,11 @@ class Kind(Protocol):
     def aside(form: Form) -> Form | None:
         """The same curve with its middle elsewhere, where that is a form; a file may be without this."""
         return None
+
+    @staticmethod
+    def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> str:
+        """The kind of a form with its laws as they are fitted, each with its gain; a file may be without this."""
+        return form.kind
 
     @staticmethod
     def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]: ...

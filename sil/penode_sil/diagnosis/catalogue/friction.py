@@ -3,7 +3,7 @@
 """Dry friction: of Coulomb, with a constant force beside it or a peak at low rates, with memory of the travel, by position or by load."""
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -56,8 +56,9 @@ EDGES, SPAN = (
 )  # of the rms rate: transitions of a friction, within that factor; smooth enough for Gauss-Newton, steep enough for any motion
 WIDEST = EDGES[-1] * SPAN  # what bends slower is a damper
 PEAKS = (0.1, 0.4)  # of the rms rate: where a friction has fallen from its breakaway
-LUGRE = "with bristles that slip sooner at speed"
+DAHL, LUGRE = "dahl_friction", "with bristles that slip sooner at speed"
 WAYS = (0.06, 0.25, 0.8)  # of the rms deflection: how far a hysteresis is bent before it slides
+LEAST = EDGES[0]  # of the rms deflection: a hysteresis that is bent less is a friction; of a friction: a lower peak is how its edge bends
 
 
 def turns(rates: Array) -> bool:
@@ -104,11 +105,11 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     for share in WAYS:
         bends = Part("bouc_wen", ("force", "N"), {"presliding": (share * motion.s_rms, "m")}, 1)
         yield Form(KINDS[2], place.loss, "force", index, (bends,))
-        yield Form(KINDS[2], place.loss, "force", index, (replace(bends, law="dahl_friction"),), "of Dahl")
+        yield Form(KINDS[2], place.loss, "force", index, (replace(bends, law=DAHL),), "of Dahl")
         for width in PEAKS if share < WAYS[-1] else ():
-            yield Form(KINDS[1], place.loss, "force", index, (bends, peak(motion, width)), "with bristles")
+            yield Form(KINDS[1], place.loss, "force", index, (replace(bends, includes=DAHL), peak(motion, width)), "with bristles")
             shapes = {**bends.shapes, "rise": (1.0, "1"), "stribeck": (width * motion.v_rms, "m/s")}
-            yield Form(KINDS[1], place.loss, "force", index, (Part("lugre_friction", ("force", "N"), shapes, 1),), LUGRE)
+            yield Form(KINDS[1], place.loss, "force", index, (Part("lugre_friction", ("force", "N"), shapes, 1, includes=DAHL),), LUGRE)
 
 
 def _growing(motion: Motion, edge: float) -> Iterable[tuple[Part, str, str]]:
@@ -118,6 +119,20 @@ def _growing(motion: Motion, edge: float) -> Iterable[tuple[Part, str, str]]:
         yield Part(f"slope*{where}*tanh(v/width)", ("slope", "N/m"), shapes, fixed=("width",)), KINDS[3], note
     for load in motion.parts[0].loads:
         yield Part("share*load*tanh(v/width)", ("share", "1"), shapes, 1, ("width",), load=load), KINDS[4], f"of {load}"
+
+
+def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> str:
+    """See Kind. A friction of Stribeck with hardly a peak is a hysteresis, and a hysteresis that is short is a friction of Coulomb."""
+    coulomb, stribeck, hysteresis, *_ = KINDS
+    force, first = laws[0]
+    if form.kind == stribeck:
+        rise = force * first.shapes["rise"][0] if form.note == LUGRE else laws[1][0]
+        if rise > LEAST * force:
+            return stribeck
+    elif form.kind != hysteresis:
+        return form.kind
+    way = first.shapes.get("presliding", (0.0, "m"))[0]
+    return hysteresis if way > LEAST * motion.s_rms else coulomb
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

@@ -119,7 +119,7 @@ def _chosen(ranked: Sequence[tuple[Score, Form]]) -> list[tuple[Score, Form]]:
 
 def is_part(form: Form, whole: Form) -> bool:
     """Has a form some of the laws of another one at its place? It may do alone where the rest turns out to be nothing."""
-    own, all_of_it = ({p.law for p in f.parts} for f in (form, whole))
+    own, all_of_it = ({law for p in f.parts for law in (p.law, p.includes) if law} for f in (form, whole))
     return form.index == whole.index and form.how == whole.how == "force" and own < all_of_it
 
 
@@ -225,11 +225,13 @@ def _fitted(bench: Bench, base: Fit, form: Form, moved: Sequence[Motion], terms:
         runs = [problem.solve(f, still, FREE_RUN) for f in starts[1:]]
         starts.append(max(runs, key=lambda f: f.cost).free)
     best = max((problem.solve(f, by, FOLLOWED) for f in starts), key=lambda f: f.cost)
-    same = [t for t in terms if (t.form.kind, t.form.where) == (term.form.kind, term.form.where)]
     level, best = fit_level(replace(bench, model=model), problem, best, bench.level)
     taken = float(np.max(base.taken(best, problem.floor)))  # the force at one place is seen by few sensors
     whole = base.taken_whole(best, problem.floor)
     gain, free = best.criterion() - base.criterion(), max((r.likelihood for r in runs), default=-np.inf)
+    if form.how == "force":
+        term = replace(term, form=catalogue.fitted(form, term.laws(best.values), moved[form.index]))
+    same = [t for t in terms if (t.form.kind, t.form.where) == (term.form.kind, term.form.where)]
     return Trial(term.form, term, best, gain, level, model, share(bench, [*same, term], best, moved), taken, whole, free)
 
 

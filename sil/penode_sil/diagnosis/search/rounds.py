@@ -226,8 +226,8 @@ def scored(bench: Bench, blocks: Blocks, t: Trial) -> Trial:
 
 
 def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Trial:
-    """Of the curve that predicts best, the form with the fewest values; one with more where it predicts every block better, and all of
-    them by `margin`. Curves that predict equally well, to MIN_GAIN, also rank by their values; to more, where one has half of
+    """Of the curve that predicts best, the form with the fewest values; one with more where it predicts blocks better (`_in_all`), and all
+    of them by `margin`. Curves that predict equally well, to MIN_GAIN, also rank by their values; to more, where one has half of
     them (`_simplicity`). A new name has to gain as much more than another law of a name already accepted as a form has."""
     named, most = {name_of(t) for t in terms}, trials[0]
     alike = [t for t in trials if np.sum(most.blocks - t.blocks) <= margin(t, base, _simplicity(t, most))]
@@ -239,7 +239,7 @@ def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Tri
         better, same_name = t.blocks - found.blocks, name_of(t) == name_of(found)
         nested = same_name or is_part(found.form, t.form)
         share = max(wrong(t.level.size), 0.0 if same_name else MIN_FORM) if nested else 1.0
-        if np.all(better > 0.0) and np.sum(better) > margin(found, base, share):
+        if _in_all(better) and np.sum(better) > margin(found, base, share):
             found = t
     return found
 
@@ -271,10 +271,15 @@ def _is_enough(part: Trial, t: Trial) -> bool:
     return is_part(part.form, t.form) and float(np.sum(t.blocks) - np.sum(part.blocks)) <= MIN_GAIN
 
 
+def _in_all(better: Array) -> bool:
+    """Is it better in MIN_BLOCKS of the blocks, and in no other one worse by MIN_GAIN and by more than it gains on average?"""
+    return bool(np.sum(better > 0.0) >= MIN_BLOCKS and -np.min(better) < max(MIN_GAIN, float(np.mean(better))))
+
+
 def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
-    """Is a form enough better, with no block that it predicts worse by MIN_GAIN and by more than it gains on average, and a size that is
-    not zero, nor a delay too short to be one, nor a limit that samples are beyond?"""
-    if not (np.sum(better > 0.0) >= MIN_BLOCKS and np.sum(better) > MIN_GAIN and -np.min(better) < max(MIN_GAIN, float(np.mean(better)))):
+    """Is a form enough better in all blocks, its size not zero, nor a delay too short to be one, nor a limit that samples are
+    beyond?"""
+    if not _in_all(better) or np.sum(better) <= MIN_GAIN:
         return False
     if t.form.how in late.HOW and t.fit.value(t.term.free[0].target) < late.SHORT * bench.step:
         return False
