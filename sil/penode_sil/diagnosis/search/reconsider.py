@@ -25,7 +25,7 @@ def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
     it also begins with the best forms of other curves. For each form of two laws, such as a friction with a constant, it also tries the
     best single law instead, and searches on from there."""
     best = _exchanged(rounds, grown)
-    for first in _other_beginnings(grown) if best.bench.level.size > 0.0 else ():
+    for first in _other_beginnings(grown, best) if best.bench.level.size > 0.0 else ():
         other = _exchanged(rounds, rounds.grow([first]))
         rounds.log(f"beginning with {name_of(first.trial)}: {_total(other) - _total(best):.0f} nats")
         if _total(other) - _total(best) > MIN_GAIN * (1 + _more(other, best)):
@@ -42,14 +42,15 @@ def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
     return best
 
 
-def _other_beginnings(grown: Grown) -> list[Accepted]:
-    """Of every other curve than that of the first accepted form, the best form that predicts about as well alone: it may be what is there,
-    and the first one, with others beside, what makes up for it."""
+def _other_beginnings(grown: Grown, best: Grown) -> list[Accepted]:
+    """Of every curve that the best end does not have, the best form that predicted about as well alone as the first one did: it may be
+    what is there, and the first one, with others beside, what makes up for it."""
     found: dict[object, Accepted] = {}
+    there = {of_curve(a.trial) for a in best.accepted}
     for first in grown.accepted[:1]:
         enough = _score(first.trial) - max(MIN_GAIN, MIN_FORM * first.trial.gain)
         for t in first.trials:
-            if of_curve(t) != of_curve(first.trial) and not is_part(first.trial.form, t.form) and _score(t) >= enough:
+            if of_curve(t) not in there and not is_part(first.trial.form, t.form) and _score(t) >= enough:
                 found.setdefault(of_curve(t), Accepted(t, first.number, (), first.trials))
     return list(found.values())
 
