@@ -68,4 +68,4 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
             return {"damping": ("N*s/m", v(0, "damping")), "knee": ("m/s", v(0, "knee"))}
         case "elastic":
             return {"damping": ("N*s/m", v(0, "stiffness") * v(0, "relaxation")), "relaxation_time": ("s", v(0, "relaxation"))}
-    return {"damping": ("N*s/m", v(0, "damping"))} if form.kind == KINDS[0] else {"quadratic": ("N/m^2", v(0, "quadratic"))}
+    return {"damping": ("N*s/m", v(0, "damping"))} if form.kind == KINDS[0] else {"quadratic": ("N/m^2", -v(0, "quadratic"))}
