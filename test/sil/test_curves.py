@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from penode_sil.diagnosis.catalogue import friction, powers, tyres
+from penode_sil.diagnosis.catalogue import dampers, friction, powers, tyres
 from penode_sil.diagnosis.catalogue.form import Form, Motion, Moved, Part, Sizes
 from penode_sil.diagnosis.catalogue.loads import put_on
 
@@ -38,6 +38,13 @@ def test_a_friction_falls_from_its_breakaway(note):
     assert np.interp(rate, v, force) == pytest.approx(1.0 + np.exp(-1.0), abs=1e-6)
     sized = friction.sizes(Form("stribeck_friction", "damper", "force", 0, (part,), note), SIZED)
     assert sized == {"breakaway": ("N", 18.0), "coulomb": ("N", 12.0), "stribeck_rate": ("m/s", 0.03 * rate)}
+
+
+def test_a_degressive_damper_with_a_corner_has_two_slopes():
+    """What it takes away begins at the knee, on either side."""
+    part = Part(dampers.CORNER, ("damping", "N*s/m"), {"knee": (0.1, "m/s")}, 1)
+    v = np.array([-0.3, -0.1, 0.05, 0.1, 0.2])
+    assert part.along(Moved(v, v, np.arange(5.0))) == pytest.approx([0.2, 0.0, 0.0, 0.0, -0.1], abs=1e-15)
 
 
 def test_the_quadratic_of_a_tyre_is_the_load_of_one_that_is_pressed_in():

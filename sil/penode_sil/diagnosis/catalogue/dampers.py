@@ -52,6 +52,7 @@ RIVALS = {
 }
 STRAIGHT = ("asymmetric_damper", "degressive_damper")
 FALLING = "with the square of the rate"
+CORNER = "-damping*(max(v - knee, 0) + min(v + knee, 0))"  # two slopes, as of a valve that opens at the knee
 WORKS = (0.25, 25.0)  # of the work of the rms rate in a recording: heat that warms a damper as far as it gets
 KNEES = (0.3, 1.0)  # of the rms rate; fitted down to friction.WIDEST, where the transition of a friction ends
 
@@ -68,6 +69,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
     for share in KNEES:
         bent = Part("degressive_damper", ("damping", "N*s/m"), {"knee": (share * motion.v_rms, "m/s")}, 1, span=share / friction.WIDEST)
         yield Form(KINDS[1], place.loss, "force", index, (bent,))
+        yield Form(KINDS[1], place.loss, "force", index, (replace(bent, law=CORNER),), "with a corner")
     for kind, sign, note in ((KINDS[2], 1, ""), (KINDS[1], -1, FALLING)):
         yield Form(kind, place.loss, "force", index, (Part("quadratic_damper", ("coefficient", "N*s^2/m^2"), {}, sign),), note)
         yield Form(kind, place.loss, "force", index, (powers.odd("v", (motion.v_reach, "m/s"), 2.5, sign),), powers.NOTE)
