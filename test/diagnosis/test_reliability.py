@@ -145,6 +145,7 @@ def test_trust_is_learnt_from_what_answers_explain(tmp_path):
     table = tmp_path / "table.json"
     table.write_text(json.dumps({"trust": levels}))
     assert [told.trust(x, table) for x in (1.0, 0.99, 0.95, 0.0, -0.2)] == [0.9375, 0.9375, 0.5, 0.5, 0.5]
+    assert told.is_likely(0.99, table) and not told.is_likely(0.95, table)  # even odds are no reason for a name
 
 
 def test_without_a_table_that_is_said(tmp_path):

@@ -24,6 +24,12 @@ def trust(explained: float, table: Path | None = None) -> float:
     return float(next((x["share"] for x in levels if explained >= x["explained"]), levels[-1]["share"]))
 
 
+def is_likely(explained: float, table: Path | None = None) -> bool:
+    """Is the best explanation of the catalogue more often right than wrong, where it takes this share of the avoidable residual?"""
+    right = trust(explained, table)
+    return right > 1.0 - right
+
+
 def reliability(causes: Sequence[Cause], explained: float, table: Path | None = None) -> dict[str, Any] | None:
     """What is known of these causes, which take the share `explained` of the avoidable residual: its `source`, the `deciles` of confidence
     that they are in, and the `trust` that their posterior was multiplied by; None if no table is kept."""

@@ -20,8 +20,8 @@ from .evidence.bench import UNSTATED
 from .extend import absorb, applied, measuring, nameless
 from .extend.resolving import resolved
 from .plant import plant
-from .reliability import trust
-from .result import EXTENDED, UNKNOWN, Cause, Diagnosis, Gain, Named
+from .reliability import is_likely, trust
+from .result import EXTENDED, UNKNOWN, Cause, Diagnosis, Gain, Named, place
 from .search import naming
 from .search.worth import WORTH
 from .study import residual
@@ -130,6 +130,12 @@ def _judged(study: Study, measured: Study, found: naming.Answer, after: Sequence
     ways = (after, study.null.simulated)  # the second with values within their tolerances, and weighed by noise of the inputs too
     quiet = [_quiet(study, x, found.found.bench.noise) for x in ways]
     share = 1.0 if causes and quiet[0] else share  # also where the nominal fit, within tolerances, leaves as little
+    if causes and not is_likely(share):
+        names = " and ".join(place(c.kind, c.where) for c in causes)
+        causes, notes = (
+            (),
+            [*notes, f"{names} would explain {share:.0%} of the avoidable residual: what explains as little is seldom right"],
+        )
     verdict = _verdict(found, causes, share, any(quiet))
     doubt = plausible.doubt(measured, after) if verdict == "unexplained" or found.found.level > WORTH else ""
     if doubt:
