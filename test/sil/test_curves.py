@@ -24,22 +24,6 @@ def test_a_power_of_the_deflection(exponent):
     assert found == pytest.approx(np.sign(x) * np.abs(x) ** exponent, abs=max(NEAR ** (exponent / 2.0), NEAR * (exponent - 1.0) / 2.0))
 
 
-SIZED = Sizes({(0, "force"): 12.0, (0, "rise"): 0.5, (0, "stribeck"): 0.03}, {}, moving=True)
-
-
-@pytest.mark.parametrize("note", friction.FALLS)
-def test_a_friction_falls_from_its_breakaway(note):
-    """It has twice its level at rest, as steep as its transition, and all but 1/e of that lost at the rate that is reported."""
-    v, rate = np.linspace(-20.0, 20.0, 400_001), np.sqrt(np.e - 1.0) if note == friction.SLOWLY else 1.0
-    motion = Motion.of([Moved(v, v, np.arange(len(v)) * 1e-3)])
-    part = friction.falling(motion, 1e-3 / motion.v_rms, 1.0 / motion.v_rms, friction.FALLS[note])
-    force = part.along(motion.parts[0])
-    assert force == pytest.approx(-force[::-1], abs=1e-9) and np.interp(5e-3, v, force) == pytest.approx(2.0, abs=2.1e-4)
-    assert np.interp(rate, v, force) == pytest.approx(1.0 + np.exp(-1.0), abs=1e-6)
-    sized = friction.sizes(Form("stribeck_friction", "damper", "force", 0, (part,), note), SIZED)
-    assert sized == {"breakaway": ("N", 18.0), "coulomb": ("N", 12.0), "stribeck_rate": ("m/s", 0.03 * rate)}
-
-
 def test_a_degressive_damper_with_a_corner_has_two_slopes():
     """What it takes away begins at the knee, on either side."""
     part = Part(dampers.CORNER, ("damping", "N*s/m"), {"knee": (0.1, "m/s")}, 1)
@@ -53,10 +37,11 @@ def test_the_quadratic_of_a_tyre_is_the_load_of_one_that_is_pressed_in():
     assert found == {"quadratic": ("N/m^2", 2e6)}
 
 
-def test_a_peak_is_one_at_its_largest_and_odd():
+@pytest.mark.parametrize("falls", friction.FALLS)
+def test_a_peak_is_one_at_its_largest_and_odd(falls):
     v = np.linspace(-20.0, 20.0, 400_001)
     motion = Motion.of([Moved(v, v, np.arange(len(v)) * 1e-3)])
-    force = friction.peak(motion, 1.0 / motion.v_rms).along(motion.parts[0])
+    force = friction.peak(motion, 1.0 / motion.v_rms, falls).along(motion.parts[0])
     assert np.max(force) == pytest.approx(1.0, rel=1e-8) and force == pytest.approx(-force[::-1], abs=1e-12)
     assert force[-1] < 2.0 / v[-1] ** 2
 

@@ -130,13 +130,12 @@ def _judged(study: Study, measured: Study, found: naming.Answer, after: Sequence
     ways = (after, study.null.simulated)  # the second with values within their tolerances, and weighed by noise of the inputs too
     quiet = [_quiet(study, x, found.found.bench.noise) for x in ways]
     share = 1.0 if causes and quiet[0] else share  # also where the nominal fit, within tolerances, leaves as little
+    tried = found.causes
     if causes and not is_likely(share):
         names = " and ".join(place(c.kind, c.where) for c in causes)
-        causes, notes = (
-            (),
-            [*notes, f"{names} would explain {share:.0%} of the avoidable residual: what explains as little is seldom right"],
-        )
-    verdict = _verdict(found, causes, share, any(quiet))
+        causes, tried = (), ()
+        notes = [*notes, f"{names} would explain {share:.0%} of the avoidable residual: what explains as little is seldom right"]
+    verdict = _verdict(tried, causes, share, any(quiet))
     doubt = plausible.doubt(measured, after) if verdict == "unexplained" or found.found.level > WORTH else ""
     if doubt:
         verdict, causes = "unexplained", ()
@@ -225,11 +224,12 @@ def _explanations(causes: Sequence[Cause], sets: Sequence[tuple[tuple[Named, ...
     return tuple(found)
 
 
-def _verdict(found: naming.Answer, causes: tuple[Cause, ...], share: float, quiet: bool) -> str:
-    """From what is named, the share of the residual that it takes in a free run, and whether noise is all that is left (`quiet`)."""
+def _verdict(tried: Sequence[Cause], causes: tuple[Cause, ...], share: float, quiet: bool) -> str:
+    """From what was `tried` and what is named, the share of the residual that it takes in a free run, and whether noise is all that is left
+    (`quiet`)."""
     if causes:
         return "explained" if share > ENOUGH else "partly_explained"
-    return "no_discrepancy" if not found.causes and quiet else "unexplained"
+    return "no_discrepancy" if not tried and quiet else "unexplained"
 
 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:

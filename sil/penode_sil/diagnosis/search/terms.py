@@ -124,8 +124,8 @@ def _values(name: str, part: Part, motion: Motion) -> Iterator[Free]:
         low, high = (0.0 if part.sign > 0 else -np.inf), (0.0 if part.sign < 0 else np.inf)
         yield Free(f"{name}_{part.gain[0]}", 0.0, 0.05 * size, sigma=size, low=low, high=high)
     for key in part.loose:
-        value, span = part.shapes[key][0], part.rounds if key == part.edge else part.span
-        low, high = value / span, span * value
+        value = part.shapes[key][0]
+        low, high = value / part.span, part.span * value
         if key in first:
             yield Free(f"{name}_{key}", value, 0.05 * value, sigma=value, low=low, high=high)
         else:
