@@ -106,9 +106,9 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         bends = Part("bouc_wen", ("force", "N"), {"presliding": (share * motion.s_rms, "m")}, 1)
         yield Form(KINDS[2], place.loss, "force", index, (bends,))
         yield Form(KINDS[2], place.loss, "force", index, (replace(bends, law=DAHL),), "of Dahl")
-        shapes = {**bends.shapes, "bend": (0.5, "1"), "share": (0.7, "1")}  # between these two, of an exponent that is fitted
+        shapes = {**bends.shapes, "bend": (0.5, "1"), "share": (0.7, "1")}  # its exponent is fitted, about 1.2 to 2.5
         loop = Part("bouc_wen_loop", bends.gain, shapes, 1, ("share",), span=3.0, includes=bends.law)
-        yield Form(KINDS[2], place.loss, "force", index, (loop,), "between")
+        yield Form(KINDS[2], place.loss, "force", index, (loop,), "of any exponent")
         for width in PEAKS if share < WAYS[-1] else ():
             yield Form(KINDS[1], place.loss, "force", index, (replace(bends, includes=DAHL), peak(motion, width)), "with bristles")
             shapes = {**bends.shapes, "rise": (1.0, "1"), "stribeck": (width * motion.v_rms, "m/s")}

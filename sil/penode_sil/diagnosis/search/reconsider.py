@@ -28,16 +28,15 @@ def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
     for first in _other_beginnings(grown, best) if best.bench.level.size > 0.0 else ():
         other = _exchanged(rounds, rounds.grow([first]))
         rounds.log(f"beginning with {name_of(first.trial)}: {_total(other) - _total(best):.0f} nats")
-        if _total(other) - _total(best) > MIN_GAIN * (1 + _more(other, best)):
-            best = other
+        best = other if _is_better(other, best) else best
     for k, a in enumerate(best.accepted):
         single = [t for t in a.trials if len(t.form.kinds) == 1]
         if len(a.trial.form.kinds) > 1 and single:
             first = Accepted(max(single, key=_score), a.number, (), a.trials)
             other = _exchanged(rounds, rounds.grow([*best.accepted[:k], first]))
-            gain = _total(other) - _total(best)
-            rounds.log(f"replacing the two-law form {name_of(a.trial)} by {[name_of(x.trial) for x in other.accepted]}: {gain:.0f} nats")
-            if gain > MIN_GAIN * (1 + _more(other, best)):
+            names, gain = [name_of(x.trial) for x in other.accepted], _total(other) - _total(best)
+            rounds.log(f"replacing the two-law form {name_of(a.trial)} by {names}: {gain:.0f} nats")
+            if _is_better(other, best):
                 return other
     return best
 
@@ -55,9 +54,10 @@ def _other_beginnings(grown: Grown, best: Grown) -> list[Accepted]:
     return list(found.values())
 
 
-def _more(end: Grown, other: Grown) -> int:
-    """How many laws more than another end has one?"""
-    return max(len(terms_of(end.accepted)) - len(terms_of(other.accepted)), 0)
+def _is_better(end: Grown, other: Grown) -> bool:
+    """Does an end gain MIN_GAIN beyond another one, and as much again for each law that it has more?"""
+    more = max(len(terms_of(end.accepted)) - len(terms_of(other.accepted)), 0)
+    return _total(end) - _total(other) > MIN_GAIN * (1 + more)
 
 
 def centred(rounds: Rounds, grown: Grown) -> Grown:

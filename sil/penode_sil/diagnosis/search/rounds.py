@@ -277,8 +277,7 @@ def _in_all(better: Array) -> bool:
 
 
 def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
-    """Is a form enough better in all blocks, its size not zero, nor a delay too short to be one, nor a limit that samples are
-    beyond?"""
+    """Is a form enough better in all blocks, its size not zero, nor a delay too short to be one, nor a limit that samples are beyond?"""
     if not _in_all(better) or np.sum(better) <= MIN_GAIN:
         return False
     if t.form.how in late.HOW and t.fit.value(t.term.free[0].target) < late.SHORT * bench.step:
