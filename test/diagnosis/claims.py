@@ -81,3 +81,9 @@ def claims(causes: Sequence[Mapping], correct: Sequence[bool], nominal: Mapping[
 def judged_by(diagnosis: Mapping) -> dict[str, float | None]:
     """For a row: what a diagnosis explains, and the trust in that by which it has multiplied the posterior of its causes."""
     return {"explained": diagnosis.get("explained"), "trust": (diagnosis.get("reliability") or {}).get("trust")}
+
+
+def unlikely(diagnosis: Mapping, rightly: Callable[[Sequence[Mapping]], list[bool]], nominal: Mapping[str, float]) -> dict:
+    """For a row: causes that a diagnosis has found and not named, for answers that explain as little are seldom right; may be empty."""
+    found = diagnosis.get("unlikely") or {}
+    return {**found, "causes": claims(found["causes"], rightly(found["causes"]), nominal)} if found else {}

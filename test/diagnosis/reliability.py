@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -96,25 +96,36 @@ def table(rows: Sequence[Mapping]) -> dict:
 
 
 def learnt(rows: Sequence[Mapping]) -> list[dict]:
-    """For each of LEVELS: causes that a search named, how many were right, and their share of the posterior, as after one right and one
-    wrong one more. A fault that samples show by themselves is more certain than any of these, and does not count."""
+    """For each of LEVELS: causes that a search found, named or not, how many were right, and their share of the posterior, as after one
+    right and one wrong one more. A fault that samples show by themselves is more certain than any of these, and does not count."""
     found = []
     for level, above in zip(LEVELS, (np.inf, *LEVELS), strict=False):
-        named = [(c, r["trust"]) for r in rows if r["trust"] and level <= r["explained"] < above for c in r["named"] if _searched(c, r)]
+        named = [(c, trust) for c, explained, trust in _found(rows) if level <= explained < above]
         right, posterior = sum(c["right"] for c, _ in named), sum(c["confidence"] / trust for c, trust in named)
         share = min((right + 1.0) / (posterior + 2.0), 0.99)
         found.append({"explained": level, "named": len(named), "right": right, "share": round(share, 4)})
     return found
 
 
-def trusted(rows: Sequence[Mapping], levels: Sequence[Mapping]) -> list[dict]:
-    """Rows with the confidences that these levels give."""
-    found = []
+def _found(rows: Sequence[Mapping]) -> Iterator[tuple[Mapping, float, float]]:
+    """Causes of searches, each with what its answer explains and the trust in that."""
     for r in rows:
-        share = next(x["share"] for x in levels if (r["explained"] or 0.0) >= x["explained"])
-        named = [c | {"confidence": c["confidence"] / r["trust"] * share} if _searched(c, r) else c for c in r["named"]]
-        found.append({**r, "named": named})
-    return found
+        yield from ((c, r["explained"], r["trust"]) for c in r["named"] if _searched(c, r))
+        few = r.get("unlikely") or {"causes": ()}
+        yield from ((c, few["explained"], few["trust"]) for c in few["causes"])
+
+
+def trusted(rows: Sequence[Mapping], levels: Sequence[Mapping]) -> list[dict]:
+    """Rows with the names, and the confidences of these, that these levels give."""
+
+    def again(c: Mapping, explained: float, trust: float) -> dict:
+        share = next(x["share"] for x in levels if explained >= x["explained"])
+        return {**c, "confidence": c["confidence"] / trust * share, "likely": share > 1.0 - share}
+
+    return [
+        {**r, "named": [*(c for c in r["named"] if not _searched(c, r)), *(c for c in (again(*x) for x in _found([r])) if c["likely"])]}
+        for r in rows
+    ]
 
 
 def _searched(claim: Mapping, row: Mapping) -> bool:

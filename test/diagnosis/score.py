@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import permutations
 from math import ceil, sqrt
 
-from claims import claims, judged_by, right as rightly
+from claims import claims, judged_by, right as rightly, unlikely
 
 OUTSIDE = "outside_taxonomy"
 MOST_ALTERNATIVES = 4  # who lists more has not decided
@@ -79,6 +79,10 @@ def outcome(truth: Mapping, causes: Sequence[Mapping], verdict: str | None) -> s
     return "part missed" if all(any(explains(c, e) for e in effects) for c in causes) else "wrong name"
 
 
+def _rightly(causes: Sequence[Mapping], truth: Mapping) -> list[bool]:
+    return rightly(causes, truth["effects"], lambda c, e: explains(c, e, told=False))
+
+
 def score(
     truth: Mapping,
     diagnosis: Mapping | None,
@@ -101,6 +105,7 @@ def score(
         "energies": [e["energy"] for e in truth["effects"]],
         "answer": [],
         "named": [],
+        "unlikely": {},
         "verdict": None,
         "right": False,
         "why": why,
@@ -116,7 +121,8 @@ def score(
     row |= {"answer": [" at ".join(_named(c)) for c in causes], "verdict": verdict, "right": what == "right", "outcome": what}
     row |= judged_by(diagnosis)
     named = [c for c in causes if isinstance(c, Mapping) and c.get("kind") != OUTSIDE]
-    row["named"] = claims(named, rightly(named, truth["effects"], lambda c, e: explains(c, e, told=False)), nominal or {})
+    row["named"] = claims(named, _rightly(named, truth), nominal or {})
+    row["unlikely"] = unlikely(diagnosis, lambda causes: _rightly(causes, truth), nominal or {})
     pairs = pairing(causes, truth["effects"], truth["bound"]) if what == "right" else None
     for i, k in (pairs or {}).items():
         effect, said = truth["effects"][k], causes[i].get("parameters") or {}

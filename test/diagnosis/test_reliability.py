@@ -131,20 +131,23 @@ def test_changes_are_adopted_and_reported(tmp_path, monkeypatch):
 
 
 def test_trust_is_learnt_from_what_answers_explain(tmp_path):
-    """Of 30 causes in answers that explain all 29 are right, of 20 in answers that explain nine tenths 10, of none with less; faults that
-    samples show are more certain than any of these, and leave that as it is."""
+    """Of 30 causes in answers that explain all 29 are right, of 20 in answers that explain nine tenths 10, of 10 without a name that
+    explain less 2, which have none again; faults that samples show are more certain than any of these, and leave that as it is."""
 
     def rows(explained, count, right, confidence=0.9):
         return [{"case": f"7:{k}", "explained": explained, "trust": 0.9, "named": [claim(confidence, k < right)]} for k in range(count)]
 
-    made = [*rows(1.0, 30, 29), *rows(0.95, 20, 10), *rows(1.0, 5, 0, 0.99)]
+    few = [{**r, "unlikely": {"explained": 0.8, "trust": 0.9, "causes": r["named"]}, "named": []} for r in rows(0.0, 10, 2)]
+    made = [*rows(1.0, 30, 29), *rows(0.95, 20, 10), *few, *rows(1.0, 5, 0, 0.99)]
     levels = reliability.learnt(made)
-    assert [(x["named"], x["right"], x["share"]) for x in levels] == [(30, 29, 0.9375), (20, 10, 0.5), (0, 0, 0.5)]
-    shares = {c["confidence"] for r in reliability.trusted(made, levels) for c in r["named"]}
-    assert shares == {0.9375, 0.5, 0.99}
+    assert [(x["named"], x["right"], x["share"]) for x in levels] == [(30, 29, 0.9375), (20, 10, 0.5), (10, 2, 0.25)]
+    named = [c for r in reliability.trusted(made, levels) for c in r["named"]]
+    assert {c["confidence"] for c in named} == {0.9375, 0.99} and len(named) == 35
+    levels[2]["share"] = 0.6
+    assert sum(c["confidence"] == pytest.approx(0.6) for r in reliability.trusted(made, levels) for c in r["named"]) == 10
     table = tmp_path / "table.json"
     table.write_text(json.dumps({"trust": levels}))
-    assert [told.trust(x, table) for x in (1.0, 0.99, 0.95, 0.0, -0.2)] == [0.9375, 0.9375, 0.5, 0.5, 0.5]
+    assert [told.trust(x, table) for x in (1.0, 0.99, 0.95, 0.0, -0.2)] == [0.9375, 0.9375, 0.5, 0.6, 0.6]
     assert told.is_likely(0.99, table) and not told.is_likely(0.95, table)  # even odds are no reason for a name
 
 

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from itertools import permutations
 
-from claims import claims, judged_by, right
+from claims import claims, judged_by, right, unlikely
 
 OUTSIDE = "outside_taxonomy"
 FORCELESS = ("wrong_parameter", "sensor_", "input_", "integration_error")  # causes that need no law
@@ -111,6 +111,7 @@ def score(truth: Mapping, diagnosis: Mapping | None, nominal: Mapping[str, float
         "answer": words,
         "confidence": [c.get("confidence") for c in causes],
         "named": claims(causes, rightly(causes, effects), nominal or {}),
+        "unlikely": unlikely(diagnosis or {}, lambda found: rightly(found, effects), nominal or {}),
         "verdict": (diagnosis or {}).get("verdict"),
         "outcome": what,
         "right": what == "right",

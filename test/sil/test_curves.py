@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from penode_sil.diagnosis import catalogue
 from penode_sil.diagnosis.catalogue import dampers, friction, powers, tyres
 from penode_sil.diagnosis.catalogue.form import Form, Motion, Moved, Part, Sizes
 from penode_sil.diagnosis.catalogue.loads import put_on
@@ -24,6 +25,22 @@ def test_a_power_of_the_deflection(exponent):
     assert found == pytest.approx(np.sign(x) * np.abs(x) ** exponent, abs=max(NEAR ** (exponent / 2.0), NEAR * (exponent - 1.0) / 2.0))
 
 
+SIZED = Sizes({(0, "force"): 12.0, (0, "rise"): 0.5, (0, "stribeck"): 0.03}, {}, moving=True)
+
+
+@pytest.mark.parametrize("note", friction.FALLS)
+def test_a_friction_falls_from_its_breakaway(note):
+    """It has twice its level at rest, as steep as its transition, and all but 1/e of that lost at the rate that is reported."""
+    v, rate = np.linspace(-20.0, 20.0, 400_001), np.sqrt(np.e - 1.0) if note == friction.SLOWLY else 1.0
+    motion = Motion.of([Moved(v, v, np.arange(len(v)) * 1e-3)])
+    part = friction.falling(motion, 1e-3 / motion.v_rms, 1.0 / motion.v_rms, friction.FALLS[note])
+    force = part.along(motion.parts[0])
+    assert force == pytest.approx(-force[::-1], abs=1e-9) and np.interp(5e-3, v, force) == pytest.approx(2.0, abs=2.1e-4)
+    assert np.interp(rate, v, force) == pytest.approx(1.0 + np.exp(-1.0), abs=1e-6)
+    sized = friction.sizes(Form("stribeck_friction", "damper", "force", 0, (part,), note), SIZED)
+    assert sized == {"breakaway": ("N", 18.0), "coulomb": ("N", 12.0), "stribeck_rate": ("m/s", 0.03 * rate)}
+
+
 def test_a_degressive_damper_with_a_corner_has_two_slopes():
     """What it takes away begins at the knee, on either side."""
     part = Part(dampers.CORNER, ("damping", "N*s/m"), {"knee": (0.1, "m/s")}, 1)
@@ -37,11 +54,10 @@ def test_the_quadratic_of_a_tyre_is_the_load_of_one_that_is_pressed_in():
     assert found == {"quadratic": ("N/m^2", 2e6)}
 
 
-@pytest.mark.parametrize("falls", friction.FALLS)
-def test_a_peak_is_one_at_its_largest_and_odd(falls):
+def test_a_peak_is_one_at_its_largest_and_odd():
     v = np.linspace(-20.0, 20.0, 400_001)
     motion = Motion.of([Moved(v, v, np.arange(len(v)) * 1e-3)])
-    force = friction.peak(motion, 1.0 / motion.v_rms, falls).along(motion.parts[0])
+    force = friction.peak(motion, 1.0 / motion.v_rms).along(motion.parts[0])
     assert np.max(force) == pytest.approx(1.0, rel=1e-8) and force == pytest.approx(-force[::-1], abs=1e-12)
     assert force[-1] < 2.0 / v[-1] ** 2
 
@@ -69,3 +85,13 @@ def test_the_preload_of_a_tyre_is_that_of_its_spring(own, preload):
     form = Form(tyres.KINDS[1], "tyre", "force", 0)
     values = {(0, "stiffness"): 5e4, (0, "static"): 0.01}
     assert tyres.sizes(form, Sizes(values, own, moving=True)) == {"preload": ("N", pytest.approx(preload))}
+
+
+@pytest.mark.parametrize("gap, kind", [(5e-6, "maxwell_bushing"), (1e-5, "backlash")])
+def test_a_play_below_what_its_contact_gives_way_is_an_elastic_mount(gap, kind):
+    """At 0.1 m/s rms, a contact that relaxes in 2 ms gives way by 0.2 mm, of which 4 % are 8 um."""
+    shapes = {"gap": (gap, "m"), "relaxation": (2e-3, "s")}
+    part = Part("loose_damper", ("damping", "N*s/m"), shapes, 1, takes="linear_damper")
+    form = Form("backlash", "spring", "force", 0, (part,), "of a damper")
+    found = catalogue.fitted(form, [(2000.0, part)], Motion((), 1e-3, 0.1, 2e-3, 0.2))
+    assert found.kind == kind and catalogue.has_file_of(found.kind, form.kind) is (kind == "backlash")

@@ -4,10 +4,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 from test_innovations import answered, swing
 
+from penode_sil.diagnosis.evidence.bench import UPDATES
 from penode_sil.diagnosis.evidence.blocks import BLOCKS, PIECES, Blocks
+from penode_sil.diagnosis.evidence.observer import Record
 
 GAP, STIFFNESS = 1.6, 0.6  # rad, N*m/rad of the stop
 
@@ -18,6 +22,30 @@ def test_each_block_has_a_piece_of_every_part_of_a_recording() -> None:
     for part in np.array_split(number, PIECES)[1:]:
         assert np.bincount(part).tolist() == [4000 // PIECES // BLOCKS] * BLOCKS
     assert [Blocks.of([250, 700, 50]).number[begin] for begin in (0, 250, 950)] == [-1, -1, -1]
+
+
+def test_no_block_has_what_only_noise_of_an_input_moves(tmp_path) -> None:
+    """A vehicle at rest before and after 1.2 s of sine on a road whose noise is stated. Means over a period of the motion make the rest
+    that much shorter, and half of them at an end may be large; without stated noise, every update is in a block."""
+    step, noise = 2e-3, 3e-5
+    t = step * np.arange(3000)
+    z = np.where(np.abs(t - 3.0) < 0.6, 0.01 * np.sin(2 * np.pi * 1.5 * t), 0.0)
+    rng = np.random.default_rng(2)
+    road, travel = z + noise * rng.standard_normal(3000), z + 5.0 + 1e-5 * rng.standard_normal(3000)
+    record = Record("bump", step, road[:, None], travel[:, None])
+
+    def bench(road: float) -> SimpleNamespace:
+        return SimpleNamespace(
+            base=SimpleNamespace(inputs=[SimpleNamespace(noise=road)]), noise=np.array([1e-5]), records=[record], update=3
+        )
+
+    moving = Blocks.moving(bench(noise)).number
+    at_all = 3 * step * np.arange(1000)
+    at = at_all[moving >= 0]
+    assert np.mean(np.abs(at - 3.0) < 0.6 + UPDATES / 2 * 3 * step + 1e-9) > 0.97
+    assert set(moving[(at_all > 2.4) & (at_all < 3.6)]) == set(range(BLOCKS))
+    assert np.ptp(np.bincount(moving[moving >= 0])) <= 0.3 * np.mean(np.bincount(moving[moving >= 0]))
+    assert (Blocks.moving(bench(0.0)).number == Blocks.of([1000]).number).all()
 
 
 def test_a_stop_that_is_hit_near_the_end_alone_is_named(tmp_path) -> None:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ def searched(case: Case, study: Study) -> naming.Answer:
 @dataclass(frozen=True, eq=False)
 class Judged:
     """What a search amounts to: `verdict` and `causes`, the share that these explain, errors of the step by sensor, notes, sets of causes
-    with their posterior; `doubt`: why the recordings may be of another plant."""
+    with their posterior; `doubt`: why the recordings may be of another plant; causes that are `unlikely` to be right."""
 
     verdict: str
     causes: tuple[Cause, ...]
@@ -52,6 +52,7 @@ class Judged:
     notes: tuple[str, ...]
     explanations: tuple[dict[str, object], ...]
     doubt: str = ""
+    unlikely: dict[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +108,7 @@ def conclude(case: Case, study: Study, found: naming.Answer, broken: Broken) -> 
         (*[judged.doubt] * bool(judged.doubt), *case.remarks, *judged.notes, *made.left, *written.notes),
         absorbed=absorbed,
         explanations=judged.explanations,
+        unlikely=judged.unlikely,
     )
     return End(
         answer,
@@ -130,8 +132,9 @@ def _judged(study: Study, measured: Study, found: naming.Answer, after: Sequence
     ways = (after, study.null.simulated)  # the second with values within their tolerances, and weighed by noise of the inputs too
     quiet = [_quiet(study, x, found.found.bench.noise) for x in ways]
     share = 1.0 if causes and quiet[0] else share  # also where the nominal fit, within tolerances, leaves as little
-    tried = found.causes
+    tried, unlikely = found.causes, {}
     if causes and not is_likely(share):
+        unlikely = {"explained": share, "trust": trust(share), "causes": [asdict(_trusted(c, share)) for c in causes]}
         names = " and ".join(place(c.kind, c.where) for c in causes)
         causes, tried = (), ()
         notes = [*notes, f"{names} would explain {share:.0%} of the avoidable residual: what explains as little is seldom right"]
@@ -141,12 +144,17 @@ def _judged(study: Study, measured: Study, found: naming.Answer, after: Sequence
         verdict, causes = "unexplained", ()
     if coarse and verdict != "unexplained":
         causes, verdict = (*causes, coarse), "explained" if verdict == "no_discrepancy" else verdict
-    causes = tuple(replace(c, confidence=trust(share) * c.confidence) for c in causes)
+    causes = tuple(_trusted(c, share) for c in causes)
     likely = [(names, trust(share) * p) for names, p in found.explanations]
     sets, tone = _explanations(causes, likely), tones.tone(study.experiments, study.metrics, after)
     verdict, causes = beside_faults(verdict, causes, faults, tone.detected)
     notes += [*found.notes, *filter(None, [plant.placeless(study.places)]), *([tones.note(model, tone)] if tone.detected else [])]
-    return Judged(verdict, causes, share, numbers, tuple(notes), sets, doubt)
+    return Judged(verdict, causes, share, numbers, tuple(notes), sets, doubt, unlikely)
+
+
+def _trusted(cause: Cause, share: float) -> Cause:
+    """A cause of an answer that takes this share of the avoidable residual, as sure as such answers are."""
+    return replace(cause, confidence=trust(share) * cause.confidence)
 
 
 def _better(written: Written) -> bool:

@@ -60,6 +60,11 @@ def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> Fo
     return replace(form, kind=named(form, laws, motion)) if named else form
 
 
+def has_file_of(kind: str, other: str) -> bool:
+    """Are two kinds of one file? What a fit has made a form of another file, that file has as a form with fewer values."""
+    return OF.get(kind) is OF.get(other)
+
+
 def stem(kind: str) -> str:
     """What the elements of a kind are called in a model file."""
     return str(getattr(OF.get(kind), "STEMS", {}).get(kind, kind))

@@ -54,6 +54,8 @@ STRAIGHT = ("asymmetric_damper", "degressive_damper")
 FALLING = "with the square of the rate"
 CORNER = "-damping*(max(v - knee, 0) + min(v + knee, 0))"  # two slopes, as of a valve that opens at the knee
 WORKS = (0.25, 25.0)  # of the work of the rms rate in a recording: heat that warms a damper as far as it gets
+COOLINGS, QUICKEST = (0.2, 1.0), 0.03  # of a recording: times in which a damper cools
+LAST, AT_REST = 100, 1e-3  # the part of a recording that is its end; of the rms rate: what is slower does not show a damping
 KNEES = (0.3, 1.0)  # of the rms rate; fitted down to friction.WIDEST, where the transition of a friction ends
 
 
@@ -78,15 +80,15 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
 
 
 def _fading(motion: Motion) -> Iterable[Part]:
-    """With time, and by its heat, which ends at what the rms rate builds up in a quarter of a recording, or does not end.
-    Cooling starts at a tenth of a recording and at all of it, and fits meet halfway: where it takes no longer than a stroke, the curve is
-    that of a degressive damper."""
+    """With time, and by its heat, which ends at what the rms rate builds up in a quarter of a recording, or does not end. Cooling starts
+    at some COOLINGS of a recording, and takes QUICKEST at least: where it takes no longer than a stroke, the curve is that of a degressive
+    damper."""
     gain = ("damping", "N*s/m")
     yield Part("fading_damper", gain, {"time": (0.5 * motion.longest, "s")}, -1)
-    for works, share in product(WORKS, (0.1, 1.0)):
+    for works, share in product(WORKS, COOLINGS):
         work = (works * motion.v_rms**2 * motion.longest, "m^2/s")
         shapes = {"work": work, "cooling": (share * motion.longest, "s")}
-        yield Part("heating_damper", gain, shapes, -1, ("work",), span=10.0**0.5)
+        yield Part("heating_damper", gain, shapes, -1, ("work",), share / QUICKEST, later=("work",))
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
@@ -110,11 +112,12 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
 
 
 def _lost(part: Part, v: Sizes) -> float:
-    """Share of the gain of a law that acts at the end of the first recording, as the last fast motion shows it."""
+    """Share of the gain of a law that acts at the end of the first recording: of a motion that has come to rest, before that."""
     if v.first is None:
         return 1.0
     fitted = replace(part, shapes={name: (v(0, name), unit) for name, (_, unit) in part.shapes.items()})
     moved = v.first.whole()
-    rate = moved.v
-    last = int(np.flatnonzero(np.abs(rate) >= np.std(rate))[-1])
-    return float(fitted.along(moved)[last] / rate[last])
+    end = 1 + int(np.flatnonzero(np.abs(moved.v) >= AT_REST * np.std(moved.v))[-1])
+    last = slice(max(0, end - max(len(moved.v) // LAST, 1)), end)
+    rate, force = moved.v[last], fitted.along(moved)[last]
+    return float(rate @ force / (rate @ rate))

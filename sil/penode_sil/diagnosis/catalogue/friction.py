@@ -50,15 +50,13 @@ RIVALS = {
     ): "small strokes as well as large ones: before it slides, a Bouc-Wen element acts as a spring, Coulomb friction does not",
 }
 ONE = True  # friction at a place is one curve, with a peak or with memory
-EDGES, SPAN = (
-    (0.04, 0.12),
-    2.0,
-)  # of the rms rate: transitions of a friction, within that factor; smooth enough for Gauss-Newton, steep enough for any motion
-WIDEST = EDGES[-1] * SPAN  # what bends slower is a damper
-PEAKS = (0.1, 0.4)  # of the rms rate: where a friction has fallen from its breakaway
+# of the rms rate: transitions of a friction, smooth enough for Gauss-Newton, steep enough for any motion; and where it has fallen
+EDGES, PEAKS = (0.04, 0.12), (0.1, 0.4)
+WIDEST = EDGES[-1] * Part.rounds  # what bends slower is a damper
 DAHL, LUGRE = "dahl_friction", "with bristles that slip sooner at speed"
 WAYS = (0.06, 0.25, 0.8)  # of the rms deflection: how far a hysteresis is bent before it slides
-LEAST = EDGES[0]  # of the rms deflection: a hysteresis that is bent less is a friction; of a friction: a lower peak is how its edge bends
+# of the rms deflection: a hysteresis that is bent less is a friction; of a friction: a lower peak is how its edge bends; of a contact:
+LEAST = EDGES[0]  # a smaller play does not show
 
 
 def turns(rates: Array) -> bool:
@@ -68,19 +66,26 @@ def turns(rates: Array) -> bool:
 
 
 def coulomb(motion: Motion, edge: float) -> Part:
-    return Part("coulomb_friction", ("force", "N"), {"transition": (edge * motion.v_rms, "m/s")}, 1, span=SPAN, edge="transition")
+    return Part("coulomb_friction", ("force", "N"), {"transition": (edge * motion.v_rms, "m/s")}, 1, edge="transition")
 
 
-FALLS = (  # of a peak over rate/width, 1 at its largest: as a Gaussian does, or as 1/rate^2
-    "2.3316439815971242*rise*exp(-(v/width)^2)*v/width",
-    "1.8898815748423097*rise*(v/width)/(1 + abs(v/width)^3)",
-)
+SLOWLY = "that falls slowly from its breakaway"
+FALLS = {"that falls from its breakaway": "*exp(-(v/stribeck)^2)", SLOWLY: "/(1 + (v/stribeck)^2)"}  # of what it has more at rest
 
 
-def peak(motion: Motion, share: float, falls: str = FALLS[0]) -> Part:
+def peak(motion: Motion, share: float) -> Part:
     """What a friction has more at the lowest rates, of 1 at its largest; `share` of the rms rate, where it has fallen. One that is narrower
     than the transition only makes up for that."""
-    return Part(falls, ("rise", "N"), {"width": (share * motion.v_rms, "m/s")}, 1, span=share / EDGES[0])
+    law = "2.3316439815971242*rise*exp(-(v/width)^2)*v/width"
+    return Part(law, ("rise", "N"), {"width": (share * motion.v_rms, "m/s")}, 1, span=share / EDGES[0])
+
+
+def falling(motion: Motion, edge: float, share: float, falls: str) -> Part:
+    """A friction that falls from its breakaway, `share` of the rms rate away from it (Armstrong-Helouvry, Dupont and Canudas de Wit,
+    Automatica 30, 1994, eq. 4): the level and what it has `rise` times more at rest."""
+    shapes = {"transition": (edge * motion.v_rms, "m/s"), "rise": (1.0, "1"), "stribeck": (share * motion.v_rms, "m/s")}
+    law = f"force*(1 + rise{falls})*tanh(v/transition)"
+    return Part(law, ("force", "N"), shapes, 1, span=share / EDGES[0], edge="transition", includes="coulomb_friction")
 
 
 def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Form]:
@@ -93,8 +98,8 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         yield Form(KINDS[0], place.loss, "force", index, (slides,))
         if grounded:
             yield Form(KINDS[0], place.loss, "force", index, (slides, replace(loads.constant(), kind=loads.KINDS[0])), "with a constant")
-        for share, falls in itertools.product(PEAKS, FALLS) if place.role != "body" else ():
-            yield Form(KINDS[1], place.loss, "force", index, (slides, peak(motion, share, falls)))
+        for share, (note, falls) in itertools.product(PEAKS, FALLS.items()) if place.role != "body" else ():
+            yield Form(KINDS[1], place.loss, "force", index, (falling(motion, edge, share, falls),), note)
         if place.role != "body":
             for grows, kind, note in _growing(motion, edge):
                 yield Form(kind, place.loss, "force", index, (slides, grows), note)
@@ -129,7 +134,7 @@ def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> st
     coulomb, stribeck, hysteresis, *_ = KINDS
     force, first = laws[0]
     if form.kind == stribeck:
-        rise = force * first.shapes["rise"][0] if form.note == LUGRE else laws[1][0]
+        rise = force * first.shapes["rise"][0] if "rise" in first.shapes else laws[1][0]
         if rise > LEAST * force:
             return stribeck
     elif form.kind != hysteresis:
@@ -144,9 +149,10 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
         return {"share": ("1", v(0, "share"))}
     force = ("N", v(0, "force"))
     match form.kind:
-        case "stribeck_friction" if form.note == LUGRE:
-            breakaway = v(0, "force") * (1.0 + v(0, "rise"))
-            return {"breakaway": ("N", breakaway), "coulomb": force, "stribeck_rate": ("m/s", v(0, "stribeck"))}
+        case "stribeck_friction" if "rise" in form.parts[0].shapes:
+            left = np.sqrt(np.e - 1.0) if form.note == SLOWLY else 1.0  # 1/e
+            rates = {"stribeck_rate": ("m/s", left * v(0, "stribeck"))}
+            return {"breakaway": ("N", v(0, "force") * (1.0 + v(0, "rise"))), "coulomb": force, **rates}
         case "stribeck_friction":
             return {"breakaway": ("N", v(0, "force") + v(1, "rise")), "coulomb": force, "stribeck_rate": ("m/s", v(1, "width"))}
         case "bouc_wen":

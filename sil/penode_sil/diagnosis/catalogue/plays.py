@@ -2,12 +2,13 @@
 # Copyright (c) 2026 the penode authors
 """Play in series with a spring, a damper, or friction."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from penode_gen.model import Model
 
 from ..plant.plant import Place
+from . import bushings, friction
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("backlash",)
@@ -47,6 +48,13 @@ def aside(form: Form) -> Form | None:
     if part is None or part.own is None or form.note:
         return None
     return replace(form, parts=tuple(replace(part, law=law) for law in HALVES), note=ASIDE)
+
+
+def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> str:
+    """See Kind. A damper with hardly a play, beside the rms deflection of its contact, has an elastic mount."""
+    shapes = laws[0][1].shapes
+    contact = motion.v_rms * shapes["relaxation"][0] if "relaxation" in shapes else 0.0
+    return bushings.KINDS[0] if contact and shapes["gap"][0] < friction.LEAST * contact else form.kind
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

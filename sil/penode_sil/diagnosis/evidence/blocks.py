@@ -10,9 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .bench import CORRELATION, Bench
+from ..study.noise import UNSEEN
+from .bench import CORRELATION, UPDATES, Bench, smooth
 from .fit import Fit, Problem
 from .gain import Level
+from .observer import Record
 
 Array = NDArray[np.float64]
 BLOCKS = 4
@@ -25,21 +27,29 @@ DRAWS = 4000  # of the Bayesian bootstrap
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Which block each update belongs to, -1 for those of a burn-in."""
+    """Which block each update belongs to, -1 for those of a burn-in, and for those at which nothing but noise moves."""
 
     number: NDArray[np.int64]
 
     @staticmethod
-    def of(lengths: Sequence[int]) -> Blocks:
-        """Of recordings with so many updates: pieces of equal length, in turn of each block."""
-        total = sum(lengths)
-        number = (np.arange(total) * BLOCKS * PIECES) // max(total, 1) % BLOCKS
+    def of(lengths: Sequence[int], still: NDArray[np.bool_] | None = None) -> Blocks:
+        """Of recordings with so many updates: pieces of equal length, in turn of each block, without updates [updates] that are `still`."""
+        moving = np.ones(sum(lengths), bool) if still is None else ~still
+        total = int(np.sum(moving))
+        number = np.where(moving, (np.cumsum(moving) - 1) * BLOCKS * PIECES // max(total, 1) % BLOCKS, -1)
         begin = 0
         for n in lengths:
             stay = max(1, int(BURN_IN * min(n, total / BLOCKS)))
             number[begin : begin + stay] = -1
             begin += n
         return Blocks(number)
+
+    @staticmethod
+    def moving(bench: Bench) -> Blocks:
+        """Of the recordings of a bench."""
+        lengths = [len(r) // bench.update for r in bench.records]
+        noise = np.array([i.noise for i in bench.base.inputs])
+        return Blocks.of(lengths, np.concatenate([resting(bench, r, noise) for r in bench.records]) if noise.any() else None)
 
     def scores(self, problem: Problem, fit: Fit) -> Array:
         """Log predictive density [blocks] of each block by the fit of the others."""
@@ -59,6 +69,19 @@ class Blocks:
             if np.sum(scores) > np.sum(best[2]):
                 best = more, wider, scores
         return best
+
+
+def resting(bench: Bench, record: Record, noise: Array) -> NDArray[np.bool_]:
+    """At which updates nothing moves but `noise` [n_u] of the inputs, by the rms of all signals over a period of the motion: only a
+    simulation follows that, and a friction that holds it still predicts better."""
+    moves = np.zeros(len(record), bool)
+    for x, size in ((record.u, noise), (record.y, bench.noise)):
+        x = np.nan_to_num(x - np.nanmedian(x, axis=0))
+        mean, square = (smooth(s, UPDATES // 2 * bench.update) for s in (x, x**2))
+        most = (UNSEEN * size) ** 2
+        moves |= np.any(square - mean**2 > most, axis=1)
+    each: NDArray[np.bool_] = ~np.any(moves[: len(moves) // bench.update * bench.update].reshape(-1, bench.update), axis=1)
+    return each
 
 
 def predictive(part: Fit, left: NDArray[np.bool_], floor: Array) -> float:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from ..evidence.bench import Bench
 from ..evidence.observer import MOST_STEPS
 from ..evidence.screening import Probe
+from ..study.fit import Free
 from .propose import FOLLOWED, PROMISE, motions
 from .terms import Term, Trial, with_forms
 
@@ -31,7 +32,8 @@ def adopt(bench: Bench, t: Trial, number: int) -> tuple[Bench, list[Term]]:
     fresh = replace(bench, model=model, free=free, level=t.level)
     problem = fresh.problem()
     fresh = replace(fresh, fit=problem.solve(free, t.fit.by.cut(len(bench.model.states)).padded(len(model.states)), FOLLOWED))
-    return steepened(fresh, term), apart(term)
+    fresh, term = loosened(steepened(fresh, term), term)
+    return fresh, apart(term)
 
 
 def steepened(bench: Bench, term: Term) -> Bench:
@@ -49,6 +51,16 @@ def steepened(bench: Bench, term: Term) -> Bench:
             break
         bench = replace(finer, free=fit.free, fit=fit)
     return bench
+
+
+def loosened(bench: Bench, term: Term) -> tuple[Bench, Term]:
+    """Fits what a term's laws leave to be fitted later, where that gains PROMISE."""
+    shapes = [(f"{name}_{k}", part.shapes[k][0]) for name, part in zip(term.elements, term.form.parts, strict=True) for k in part.later]
+    more = [Free(name, x, x, log=True, sigma=1.0, origin=x) for name, x in shapes]
+    fit = bench.problem().solve((*bench.fit.free, *more), bench.fit.by, FOLLOWED) if more else bench.fit
+    if not fit.cost > bench.fit.cost + PROMISE:
+        return bench, term
+    return replace(bench, free=fit.free, fit=fit), replace(term, free=(*term.free, *more))
 
 
 def apart(term: Term) -> list[Term]:

@@ -35,7 +35,8 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score
     y = y[np.isfinite(y)]
     if not np.any(y > 0.0):
         return []
-    limits = [float(x) for x in (*np.quantile(y, SHARES), 1.1 * np.max(y)) if x > 0.0]
+    piled = np.quantile(y, SHARES[0]) >= least(bench, index)
+    limits = [max(float(x), least(bench, index)) for x in (*np.quantile(y, SHARES), 1.1 * np.max(y)) if x > 0.0]
 
     def gained(sizes: Sequence[float], sharp: float) -> list[float]:
         changes = []
@@ -46,7 +47,7 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score
         return [s.gain for s in as_they_are(bench.fit, changes)]
 
     gains, soft = gained(limits, np.inf), limits[-1:]
-    if len(bench.nominal) == len(bench.fit.free) and _within(bench, index, limits[0]):
+    if len(bench.nominal) == len(bench.fit.free) and piled:
         gains = [max(pair) for pair in zip(gains, _gains_of_nominal(bench, index, limits), strict=True)]
     found = []
     for each, sizes, note in ((gains, limits, ""), (gained(soft, SHARP), soft, SOFT)):
@@ -64,7 +65,7 @@ def _cut(x: Array, limit: float, sharp: float) -> Array:
 def _gains_of_nominal(bench: Bench, index: int, limits: Sequence[float]) -> list[float]:
     """Log likelihood gained by each limit of a sensor with nominal parameters: those fitted to clipped data give too little motion."""
     form = Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[0])
-    model, (limit,) = limited(bench.model, form, "x0_0")
+    model, (limit,) = limited(bench.model, form, "x0_0", least(bench, index))
     problem, free = bench.problem(model), (*bench.nominal, limit)
     shifts = np.zeros((len(limits), len(free)))
     shifts[:, -1] = np.log(np.array(limits) / limits[0])
@@ -72,14 +73,14 @@ def _gains_of_nominal(bench: Bench, index: int, limits: Sequence[float]) -> list
     return [likelihood(n, np.isfinite(n), problem.floor)[1] - bench.fit.likelihood for n in nu]
 
 
-def limited(model: Model, form: Form, stem: str) -> tuple[Model, tuple[Free, ...]]:
-    """The model with a limit of a sensor, as a parameter of this `stem` so large that it has no effect, and its free values: the limit, and
-    how sharp a soft one is."""
+def limited(model: Model, form: Form, stem: str, low: float = 0.0) -> tuple[Model, tuple[Free, ...]]:
+    """The model with a limit of a sensor, as a parameter of this `stem` so large that it has no effect, and its free values: the limit, at
+    least `low`, and how sharp a soft one is."""
     s, name, sharp = model.sensors[form.index], f"{stem}_limit", f"{stem}_sharp"
     cut = replace(s, expression=expression(s.expression, name, sharp if form.note else ""))
     sensors = (*model.sensors[: form.index], cut, *model.sensors[form.index + 1 :])
     parameters = {**model.parameters, name: Parameter(name, FAR**2 * form.limit, s.unit)}
-    free = [Free(name, form.limit, form.limit, log=True, sigma=1.0, origin=form.limit)]
+    free = [Free(name, form.limit, form.limit, log=True, sigma=1.0, origin=form.limit, low=low)]
     if form.note:
         parameters[sharp] = Parameter(sharp, SHARP, "1")
         free.append(Free(sharp, SHARP, SHARP, log=True, sigma=1.0, origin=SHARP, low=0.5 * SHARP))
@@ -93,16 +94,11 @@ def expression(signal: str, limit: str, sharp: str = "") -> str:
     return f"min(max({signal}, -{limit}), {limit})"
 
 
-def is_possible(bench: Bench, form: Form, limit: float) -> bool:
-    """Has a sensor all samples within a limit, but for noise and a few that are far out? A friction looks like one that many are beyond."""
-    return _within(bench, form.index, limit)
-
-
-def _within(bench: Bench, index: int, limit: float) -> bool:
-    """Does hardly any sample of a sensor exceed a limit by more than three deviations of its noise?"""
-    y = np.concatenate([r.y[:, index] for r in bench.records])
-    most = limit + 3.0 * bench.noise[index]
-    return bool(np.nanquantile(np.abs(y), 0.998) <= most)
+def least(bench: Bench, index: int) -> float:
+    """The least limit that a sensor may have: but for noise and a few that are far out, all samples are within it. A friction looks like a
+    lower one; curves of a model that are somewhat off would make it that."""
+    y = np.abs(np.concatenate([r.y[:, index] for r in bench.records]))
+    return max(float(np.nanquantile(y, 0.998)) - 3.0 * float(bench.noise[index]), 0.0)
 
 
 def share(bench: Bench, form: Form, limit: Free, sharp: float = np.inf) -> float:

@@ -60,7 +60,7 @@ class Found:
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own.
     Where none is large, it looks again with an observer that corrects less: one that follows all that moves hides what happens seldom."""
-    rounds = Rounds(bench, Blocks.of([len(r) // bench.update for r in bench.records]), log)
+    rounds = Rounds(bench, Blocks.moving(bench), log)
     end = reconsidered(rounds, rounds.grow())
     if not any(end.large) and bench.level.size > 0.0:
         stiffer = replace(rounds, stiffer=LEVEL_FACTORS[1])

@@ -18,7 +18,7 @@ from ..evidence.gain import Level
 from ..evidence.prior import Stated, stated
 from ..evidence.screening import Probe
 from ..extend import late
-from . import clipping, holding
+from . import holding
 from .adopting import adopt
 from .propose import FOLLOWED, PROMISE, is_part, motions, propose
 from .terms import Term, Trial, without_any
@@ -277,12 +277,10 @@ def _in_all(better: Array) -> bool:
 
 
 def _accepted(bench: Bench, t: Trial, better: Array) -> bool:
-    """Is a form enough better in all blocks, its size not zero, nor a delay too short to be one, nor a limit that samples are beyond?"""
+    """Is a form enough better in all blocks, its size not zero, nor a delay too short to be one?"""
     if not _in_all(better) or np.sum(better) <= MIN_GAIN:
         return False
     if t.form.how in late.HOW and t.fit.value(t.term.free[0].target) < late.SHORT * bench.step:
-        return False
-    if t.form.how == "clip" and not clipping.is_possible(bench, t.form, t.fit.value(t.term.free[0].target)):
         return False
     known = undetermined(bench.model, t.fit)
     return all(abs(t.fit.value(f.target) - f.origin) > Z_95 * t.fit.deviation(f.target, known) for f in t.term.free if not f.log)

@@ -95,7 +95,7 @@ def with_forms(bench: Bench, forms: Sequence[Form], moved: Sequence[Motion], fir
     elements, where, parameters, terms, model = [], [], {}, [], bench.model
     for i, form in enumerate(forms):
         if form.how == "clip":
-            model, values = clipping.limited(model, form, f"x{first}_{i}")
+            model, values = clipping.limited(model, form, f"x{first}_{i}", clipping.least(bench, form.index))
             terms.append(Term(form, (), values))
             continue
         if form.how != "force":
@@ -124,8 +124,8 @@ def _values(name: str, part: Part, motion: Motion) -> Iterator[Free]:
         low, high = (0.0 if part.sign > 0 else -np.inf), (0.0 if part.sign < 0 else np.inf)
         yield Free(f"{name}_{part.gain[0]}", 0.0, 0.05 * size, sigma=size, low=low, high=high)
     for key in part.loose:
-        value = part.shapes[key][0]
-        low, high = value / part.span, part.span * value
+        value, span = part.shapes[key][0], part.rounds if key == part.edge else part.span
+        low, high = value / span, span * value
         if key in first:
             yield Free(f"{name}_{key}", value, 0.05 * value, sigma=value, low=low, high=high)
         else:
