@@ -10,7 +10,7 @@ import pytest
 import reliability
 from scipy import stats
 
-from penode_sil.diagnosis import reliability as told
+from penode_sil.diagnosis import reliability as told, verdict
 from penode_sil.diagnosis.result import Cause
 
 
@@ -162,3 +162,15 @@ def test_kept_table_is_sound():
     if (known := told.reliability(causes, 1.0)) is not None:
         assert known["source"] and known["cases"] > 0 and known["deciles"]
         assert all(0 < d["named"] >= d["right"] and d["ci95"][0] <= d["right"] / d["named"] <= d["ci95"][1] for d in known["deciles"])
+
+
+def test_names_that_are_unlikely_are_kept_apart(tmp_path, monkeypatch):
+    """The table of levels trusts half of the residual by 0.25: its cause has no name, but its confidence, and a note."""
+    monkeypatch.setattr(told, "TABLE", tmp_path / "table.json")
+    told.TABLE.write_text(json.dumps({"trust": [{"explained": 0.9, "share": 0.8}, {"explained": 0.0, "share": 0.25}]}))
+    causes = (Cause("coulomb_friction", "damper", {}, 0.6),)
+    assert verdict._likely(causes, 0.95) == (causes, {}, [])
+    named, unlikely, (note,) = verdict._likely(causes, 0.5)
+    assert named == () and note.startswith("Coulomb friction at damper would explain 50% of the avoidable residual")
+    assert (unlikely["explained"], unlikely["trust"]) == (0.5, 0.25)
+    assert [(c["kind"], c["confidence"]) for c in unlikely["causes"]] == [("coulomb_friction", pytest.approx(0.15))]

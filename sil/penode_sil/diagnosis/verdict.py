@@ -132,13 +132,8 @@ def _judged(study: Study, measured: Study, found: naming.Answer, after: Sequence
     ways = (after, study.null.simulated)  # the second with values within their tolerances, and weighed by noise of the inputs too
     quiet = [_quiet(study, x, found.found.bench.noise) for x in ways]
     share = 1.0 if causes and quiet[0] else share  # also where the nominal fit, within tolerances, leaves as little
-    tried, unlikely = found.causes, {}
-    if causes and not is_likely(share):
-        unlikely = {"explained": share, "trust": trust(share), "causes": [asdict(_trusted(c, share)) for c in causes]}
-        names = " and ".join(place(c.kind, c.where) for c in causes)
-        causes, tried = (), ()
-        notes = [*notes, f"{names} would explain {share:.0%} of the avoidable residual: what explains as little is seldom right"]
-    verdict = _verdict(tried, causes, share, any(quiet))
+    causes, unlikely, doubts = _likely(causes, share)
+    verdict = _verdict(() if unlikely else found.causes, causes, share, any(quiet))
     doubt = plausible.doubt(measured, after) if verdict == "unexplained" or found.found.level > WORTH else ""
     if doubt:
         verdict, causes = "unexplained", ()
@@ -148,8 +143,18 @@ def _judged(study: Study, measured: Study, found: naming.Answer, after: Sequence
     likely = [(names, trust(share) * p) for names, p in found.explanations]
     sets, tone = _explanations(causes, likely), tones.tone(study.experiments, study.metrics, after)
     verdict, causes = beside_faults(verdict, causes, faults, tone.detected)
-    notes += [*found.notes, *filter(None, [plant.placeless(study.places)]), *([tones.note(model, tone)] if tone.detected else [])]
+    notes += [*doubts, *found.notes, *filter(None, [plant.placeless(study.places)]), *([tones.note(model, tone)] if tone.detected else [])]
     return Judged(verdict, causes, share, numbers, tuple(notes), sets, doubt, unlikely)
+
+
+def _likely(causes: tuple[Cause, ...], share: float) -> tuple[tuple[Cause, ...], dict[str, object], list[str]]:
+    """Causes that take this share of the avoidable residual, where such answers are more often right than wrong; otherwise none, but what
+    `unlikely` in diagnosis.json says of them, and a note: their laws stay in the extended model."""
+    if not causes or is_likely(share):
+        return causes, {}, []
+    names = " and ".join(place(c.kind, c.where) for c in causes)
+    note = f"{names} would explain {share:.0%} of the avoidable residual: what explains as little is seldom right; it is in {EXTENDED}"
+    return (), {"explained": share, "trust": trust(share), "causes": [asdict(_trusted(c, share)) for c in causes]}, [note]
 
 
 def _trusted(cause: Cause, share: float) -> Cause:

@@ -17,7 +17,7 @@ from penode_gen.twins.numeric import Numeric
 
 from ...batch import Batch
 
-LONGEST = {"loose_damper": 2.5e-4, "presliding": 2.5e-4, "friction": 5e-4, "tanh(v/": 5e-4}  # [s] step of laws that follow short ways
+LONGEST = {"loose_damper": 2.5e-4, "presliding": 2.5e-4, "friction": 5e-4}  # [s] step of laws that follow short ways
 
 
 def longest(model: Model) -> float:
