@@ -79,13 +79,13 @@ class Motion:
 @dataclass(frozen=True, eq=False)
 class Part:
     """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies it,
-    with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values, but
-    those that are fitted `later`, once the form is accepted: before, its gain would be poorly known beside them. A shape stays
-    within a factor of `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a jump,
-    within a factor of `rounds`, and may become as small as recordings ask for once the form is accepted. `kind`: what the law is by itself,
-    where that is another cause. `load`: the expression whose magnitude an expression calls `load`. `includes`: a law that it has the curve
-    of too. `takes`: the law of linear elements that it takes a share of; `own`: the parameter of such an element, and its value in the
-    file, where it takes all of it: that is its gain, and the first free shape its size."""
+    with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values, but those that
+    are fitted `later`, within a factor, once the form is accepted: before, its gain would be poorly known beside them. A shape stays within
+    a factor of `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a jump, within a
+    factor of `rounds`, and may become as small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where
+    that is another cause. `load`: the expression whose magnitude an expression calls `load`. `includes`: a law that it has the curve of
+    too. `takes`: the law of linear elements that it takes a share of; `own`: the parameter of such an element, and its value in the file,
+    where it takes all of it: that is its gain, and the first free shape its size."""
 
     law: str
     gain: tuple[str, str]
@@ -100,7 +100,7 @@ class Part:
     includes: str = ""
     takes: str = ""
     own: tuple[str, float] | None = None
-    later: tuple[str, ...] = ()
+    later: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def loose(self) -> list[str]:

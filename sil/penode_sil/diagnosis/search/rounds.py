@@ -87,7 +87,7 @@ class Rounds:
             if not hides and not sure and not _matters(best) and not _may_remain(bench, large, best):
                 break
             number = 1 + max((a.number for a in found), default=-1)
-            bench, terms = adopt(bench, best, number)
+            best, bench, terms = _adopted(bench, best, good, number)
             bench, scores = _based(bench, self.blocks)
             rivals = tuple(replace(t, blocks=scores) if t is best else t for t in good)  # with edges as steep as they are now
             found.append(Accepted(best, number, tuple(terms), rivals))
@@ -163,6 +163,14 @@ class Rounds:
 def terms_of(accepted: Sequence[Accepted]) -> list[Term]:
     """All terms of accepted forms."""
     return [x for a in accepted for x in a.terms]
+
+
+def _adopted(bench: Bench, best: Trial, good: Sequence[Trial], number: int) -> tuple[Trial, Bench, list[Term]]:
+    """Adopts the best trial, or one of the same name with as many values, if that fits better with its edges as steep as they are: a peak
+    that falls more slowly makes up for an edge that is too wide."""
+    alike = [best, *(t for t in good if t is not best and name_of(t) == name_of(best) and len(t.term.free) == len(best.term.free))]
+    tried = [(t, *adopt(bench, t, number)) for t in alike if t is best or all(any(p.edge for p in x.form.parts) for x in (t, best))]
+    return max(tried, key=lambda x: x[1].fit.cost)
 
 
 def _hidden(t: Trial, small: Trial) -> bool:
