@@ -25,14 +25,15 @@ def test_each_block_has_a_piece_of_every_part_of_a_recording() -> None:
 
 
 def test_no_block_has_what_only_noise_of_an_input_moves(tmp_path) -> None:
-    """A vehicle at rest before and after 1.2 s of sine on a road whose noise is stated. Means over a period of the motion make the rest
-    that much shorter, and half of them at an end may be large; without stated noise, every update is in a block."""
+    """A vehicle at rest before and after 1.2 s of sine on a road whose noise is stated; one of its sensors is not recorded. Means over a
+    period of the motion make the rest that much shorter, and half of them at an end may be large; without stated noise, every update is in
+    a block."""
     step, noise = 2e-3, 3e-5
     t = step * np.arange(3000)
     z = np.where(np.abs(t - 3.0) < 0.6, 0.01 * np.sin(2 * np.pi * 1.5 * t), 0.0)
     rng = np.random.default_rng(2)
     road, travel = z + noise * rng.standard_normal(3000), z + 5.0 + 1e-5 * rng.standard_normal(3000)
-    record = Record("bump", step, road[:, None], travel[:, None])
+    record = Record("bump", step, road[:, None], np.column_stack([travel, np.full(3000, np.nan)]))
 
     def bench(road: float) -> SimpleNamespace:
         return SimpleNamespace(

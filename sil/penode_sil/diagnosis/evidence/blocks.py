@@ -76,6 +76,7 @@ def resting(bench: Bench, record: Record, noise: Array) -> NDArray[np.bool_]:
     simulation follows that, and a friction that holds it still predicts better."""
     moves = np.zeros(len(record), bool)
     for x, size in ((record.u, noise), (record.y, bench.noise)):
+        x = np.where(np.isfinite(x).any(axis=0), x, 0.0)  # a sensor that this recording lacks is at rest
         x = np.nan_to_num(x - np.nanmedian(x, axis=0))
         mean, square = (smooth(s, UPDATES // 2 * bench.update) for s in (x, x**2))
         most = (UNSEEN * size) ** 2
