@@ -27,7 +27,9 @@ TABLE = (
     Path(__file__).resolve().parents[2] / "sil/penode_sil/diagnosis/templates/reliability.json"
 )  # of which penode_sil.diagnosis.reliability reads
 APART = 0.05  # that mean confidence and share right may be, over all
-LEVELS = (0.99, 0.9, 0.0)  # shares of the avoidable residual: from each on, up to the one before, answers are trusted alike
+# shares of the power of the avoidable residual: from each on, up to the one before, answers are trusted alike. Of its amplitude, a tenth is
+# left at most, a third, a half, or more
+LEVELS = (0.99, 0.9, 0.75, 0.0)
 
 
 def read(path: Path, command: str) -> tuple[list[dict], dict]:
@@ -119,8 +121,9 @@ def trusted(rows: Sequence[Mapping], levels: Sequence[Mapping]) -> list[dict]:
     """Rows with the names, and the confidences of these, that these levels give."""
 
     def again(c: Mapping, explained: float, trust: float) -> dict:
-        share = next(x["share"] for x in levels if explained >= x["explained"])
-        return {**c, "confidence": c["confidence"] / trust * share, "likely": share > 1.0 - share}
+        level = next((x for x in levels if explained >= x["explained"]), levels[-1])
+        likely = 2 * level["right"] > level["named"]
+        return {**c, "confidence": c["confidence"] / trust * level["share"], "likely": likely}
 
     return [
         {**r, "named": [*(c for c in r["named"] if not _searched(c, r)), *(c for c in (again(*x) for x in _found([r])) if c["likely"])]}

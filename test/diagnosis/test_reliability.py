@@ -140,14 +140,14 @@ def test_trust_is_learnt_from_what_answers_explain(tmp_path):
     few = [{**r, "unlikely": {"explained": 0.8, "trust": 0.9, "causes": r["named"]}, "named": []} for r in rows(0.0, 10, 2)]
     made = [*rows(1.0, 30, 29), *rows(0.95, 20, 10), *few, *rows(1.0, 5, 0, 0.99)]
     levels = reliability.learnt(made)
-    assert [(x["named"], x["right"], x["share"]) for x in levels] == [(30, 29, 0.9375), (20, 10, 0.5), (10, 2, 0.25)]
+    assert [(x["named"], x["right"], x["share"]) for x in levels] == [(30, 29, 0.9375), (20, 10, 0.5), (10, 2, 0.25), (0, 0, 0.5)]
     named = [c for r in reliability.trusted(made, levels) for c in r["named"]]
     assert {c["confidence"] for c in named} == {0.9375, 0.99} and len(named) == 35
-    levels[2]["share"] = 0.6
+    levels[2] |= {"right": 6, "share": 0.6}
     assert sum(c["confidence"] == pytest.approx(0.6) for r in reliability.trusted(made, levels) for c in r["named"]) == 10
     table = tmp_path / "table.json"
     table.write_text(json.dumps({"trust": levels}))
-    assert [told.trust(x, table) for x in (1.0, 0.99, 0.95, 0.0, -0.2)] == [0.9375, 0.9375, 0.5, 0.6, 0.6]
+    assert [told.trust(x, table) for x in (1.0, 0.99, 0.95, 0.8, 0.0, -0.2)] == [0.9375, 0.9375, 0.5, 0.6, 0.5, 0.5]
     assert told.is_likely(0.99, table) and not told.is_likely(0.95, table)  # even odds are no reason for a name
 
 
@@ -167,7 +167,8 @@ def test_kept_table_is_sound():
 def test_names_that_are_unlikely_are_kept_apart(tmp_path, monkeypatch):
     """The table of levels trusts half of the residual by 0.25: its cause has no name, but its confidence, and a note."""
     monkeypatch.setattr(told, "TABLE", tmp_path / "table.json")
-    told.TABLE.write_text(json.dumps({"trust": [{"explained": 0.9, "share": 0.8}, {"explained": 0.0, "share": 0.25}]}))
+    rows = [{"explained": 0.9, "named": 5, "right": 4, "share": 0.8}, {"explained": 0.0, "named": 4, "right": 2, "share": 0.25}]
+    told.TABLE.write_text(json.dumps({"trust": rows}))
     causes = (Cause("coulomb_friction", "damper", {}, 0.6),)
     assert verdict._likely(causes, 0.95) == (causes, {}, [])
     named, unlikely, (note,) = verdict._likely(causes, 0.5)

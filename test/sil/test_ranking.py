@@ -184,3 +184,13 @@ def test_of_several_small_forms_at_a_place_none_is_its_curve():
     assert innovate._shares(sides, stop) and innovate._shares(stop, sides)
     assert not innovate._shares(sides, sides) and not innovate._shares(sides, found("coulomb_friction", 600.0, "bearing", 1))
     assert not innovate._shares(stop, found("cubic_spring", 38.0))
+
+
+@pytest.mark.parametrize("transition, kind", [(0.01, "stribeck_friction"), (0.02, "")])
+def test_a_peak_narrower_than_its_transition_is_none(transition, kind):
+    """At once with the transition, it only makes that steeper: Coulomb friction is."""
+    shapes = {"transition": (transition, "m/s"), "rise": (2.0, "1"), "stribeck": (0.015, "m/s")}
+    part = Part("a law that falls", ("force", "N"), shapes)
+    form = Form("stribeck_friction", "damper", "force", 0, (part,), "that falls from its breakaway")
+    found = catalogue.fitted(form, [(10.0, part)], Motion((), 1e-3, 0.1, 2e-3, 0.2)).kind
+    assert found == kind and catalogue.has_file_of(found, form.kind) is bool(kind)

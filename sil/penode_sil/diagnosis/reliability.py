@@ -20,14 +20,18 @@ TABLE = resource("penode_sil.diagnosis", "templates", "reliability.json")  # bes
 def trust(explained: float, table: Path | None = None) -> float:
     """How likely the best explanation of the catalogue is right that takes away this share of the avoidable residual: the share that was,
     of the posterior of those which took about as much."""
-    levels = json.loads((table or TABLE).read_text(encoding="utf-8"))["trust"]
-    return float(next((x["share"] for x in levels if explained >= x["explained"]), levels[-1]["share"]))
+    return float(_level(explained, table)["share"])
 
 
 def is_likely(explained: float, table: Path | None = None) -> bool:
-    """Is the best explanation of the catalogue more often right than wrong, where it takes this share of the avoidable residual?"""
-    right = trust(explained, table)
-    return right > 1.0 - right
+    """Were answers that took about this share of the avoidable residual more often right than wrong?"""
+    level = _level(explained, table)
+    return bool(level["right"] > level["named"] - level["right"])
+
+
+def _level(explained: float, table: Path | None) -> dict[str, Any]:
+    levels: list[dict[str, Any]] = json.loads((table or TABLE).read_text(encoding="utf-8"))["trust"]
+    return next((x for x in levels if explained >= x["explained"]), levels[-1])
 
 
 def reliability(causes: Sequence[Cause], explained: float, table: Path | None = None) -> dict[str, Any] | None:

@@ -183,7 +183,8 @@ class Kind(Protocol):
 
     @staticmethod
     def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> str:
-        """The kind of a form with its laws as they are fitted, each with its gain; a file may be without this."""
+        """The kind of a form with its laws as they are fitted, each with its gain, empty where they are no form of this file; a file may be
+        without this."""
         return form.kind
 
     @staticmethod

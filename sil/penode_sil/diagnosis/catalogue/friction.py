@@ -130,9 +130,12 @@ def _growing(motion: Motion, edge: float) -> Iterable[tuple[Part, str, str]]:
 
 
 def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> str:
-    """See Kind. A friction of Stribeck with hardly a peak is a hysteresis, and a hysteresis that is short is a friction of Coulomb."""
+    """See Kind. A friction of Stribeck with hardly a peak is a hysteresis, and a hysteresis that is short is a friction of Coulomb. A peak
+    that is narrower than the transition only makes up for that, and is none."""
     coulomb, stribeck, hysteresis, *_ = KINDS
     force, first = laws[0]
+    if "transition" in first.shapes and "stribeck" in first.shapes and first.shapes["stribeck"][0] < first.shapes["transition"][0]:
+        return ""
     if form.kind == stribeck:
         rise = force * first.shapes["rise"][0] if "rise" in first.shapes else laws[1][0]
         if rise > LEAST * force:
