@@ -170,10 +170,15 @@ def wrong(t: Mapping) -> list[str]:
 
 
 def source(made: Sequence[Mapping]) -> str:
-    """Which campaigns: 597 cases of seed 5 and 300 of seed 808, commit 1234567."""
-    said = [f"{m['cases']} of seed {', '.join(map(str, m['seeds']))}" for m in made]
-    said[0] = said[0].replace(" of", " cases of", 1)
-    return f"{' and '.join(said)}, {', '.join(sorted({c for m in made for c in m['codes']}))}"
+    """Which campaigns: 597 cases of seed 5 and 300 of seed 808, commits 1234567 and 89abcde."""
+    drawn: dict[str, int] = {}
+    for m in made:
+        seeds = ", ".join(map(str, m["seeds"]))
+        drawn[seeds] = drawn.get(seeds, 0) + m["cases"]
+    first, *others = [f"{cases} cases of seed {seeds}" for seeds, cases in drawn.items()]
+    codes = sorted({c for m in made for c in m["codes"]})
+    code = f"commits {' and '.join(c.removeprefix('commit ') for c in codes)}" if len(codes) > 1 else codes[0]
+    return f"{' and '.join([first, *(o.replace(' cases', '', 1) for o in others)])}, {code}"
 
 
 def parsed() -> argparse.Namespace:

@@ -120,7 +120,7 @@ def test_changes_are_adopted_and_reported(tmp_path, monkeypatch):
     low, high = (f"{100 * x:.0f}" for x in stats.binomtest(39, 40).proportion_ci(method="wilson"))
     assert told.line(known, 0.94) == (
         f"of causes named with 90 to 100 % confidence in simulated cases, 39 of 40 were right (98 %, 95 % interval {low} to {high} %); "
-        "source: 40 cases of seed 7 and 10 of seed 7, commit abc"
+        "source: 50 cases of seed 7, commit abc"
     )
     assert [d["from"] for d in known["deciles"]] == [0.9]
     assert told.line(known, 0.2).startswith("no cause was named with this confidence")
@@ -175,3 +175,10 @@ def test_names_that_are_unlikely_are_kept_apart(tmp_path, monkeypatch):
     assert named == () and note.startswith("Coulomb friction at damper would explain 50% of the avoidable residual")
     assert (unlikely["explained"], unlikely["trust"]) == (0.5, 0.25)
     assert [(c["kind"], c["confidence"]) for c in unlikely["causes"]] == [("coulomb_friction", pytest.approx(0.15))]
+
+
+def test_the_source_counts_cases_by_seed():
+    """Of several campaigns with one seed, all cases; of several commits, all."""
+    made = [{"seeds": [5], "cases": 40, "codes": ["commit abc"]}, *({"seeds": [7], "cases": n, "codes": ["commit def"]} for n in (20, 16))]
+    assert reliability.source(made) == "40 cases of seed 5 and 36 of seed 7, commits abc and def"
+    assert reliability.source(made[:1]) == "40 cases of seed 5, commit abc"
