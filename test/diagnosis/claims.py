@@ -84,6 +84,6 @@ def judged_by(diagnosis: Mapping) -> dict[str, float | None]:
 
 
 def unlikely(diagnosis: Mapping, rightly: Callable[[Sequence[Mapping]], list[bool]], nominal: Mapping[str, float]) -> dict:
-    """For a row: causes that a diagnosis has found and not named, for answers that explain as little are seldom right; may be empty."""
+    """For a row: causes that a diagnosis has found and not named, for such answers are wrong at least as often as right; or empty."""
     found = diagnosis.get("unlikely") or {}
     return {**found, "causes": claims(found["causes"], rightly(found["causes"]), nominal)} if found else {}

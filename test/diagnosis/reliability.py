@@ -23,6 +23,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 import numpy as np
 from score import wilson
 
+from penode_sil.diagnosis import reliability as told
+
 TABLE = (
     Path(__file__).resolve().parents[2] / "sil/penode_sil/diagnosis/templates/reliability.json"
 )  # of which penode_sil.diagnosis.reliability reads
@@ -121,9 +123,8 @@ def trusted(rows: Sequence[Mapping], levels: Sequence[Mapping]) -> list[dict]:
     """Rows with the names, and the confidences of these, that these levels give."""
 
     def again(c: Mapping, explained: float, trust: float) -> dict:
-        level = next((x for x in levels if explained >= x["explained"]), levels[-1])
-        likely = 2 * level["right"] > level["named"]
-        return {**c, "confidence": c["confidence"] / trust * level["share"], "likely": likely}
+        level = told.level(levels, explained)
+        return {**c, "confidence": c["confidence"] / trust * level["share"], "likely": told.mostly_right(level)}
 
     return [
         {**r, "named": [*(c for c in r["named"] if not _searched(c, r)), *(c for c in (again(*x) for x in _found([r])) if c["likely"])]}
@@ -175,10 +176,10 @@ def source(made: Sequence[Mapping]) -> str:
     for m in made:
         seeds = ", ".join(map(str, m["seeds"]))
         drawn[seeds] = drawn.get(seeds, 0) + m["cases"]
-    first, *others = [f"{cases} cases of seed {seeds}" for seeds, cases in drawn.items()]
+    counts = [f"{cases}{' cases' * (k == 0)} of seed {seeds}" for k, (seeds, cases) in enumerate(drawn.items())]
     codes = sorted({c for m in made for c in m["codes"]})
     code = f"commits {' and '.join(c.removeprefix('commit ') for c in codes)}" if len(codes) > 1 else codes[0]
-    return f"{' and '.join([first, *(o.replace(' cases', '', 1) for o in others)])}, {code}"
+    return f"{' and '.join(counts)}, {code}"
 
 
 def parsed() -> argparse.Namespace:

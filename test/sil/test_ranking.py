@@ -188,9 +188,8 @@ def test_of_several_small_forms_at_a_place_none_is_its_curve():
 
 @pytest.mark.parametrize("transition, kind", [(0.01, "stribeck_friction"), (0.02, "")])
 def test_a_peak_narrower_than_its_transition_is_none(transition, kind):
-    """At once with the transition, it only makes that steeper: Coulomb friction is."""
+    """It only makes the transition steeper, and Coulomb friction has that with fewer values."""
     shapes = {"transition": (transition, "m/s"), "rise": (2.0, "1"), "stribeck": (0.015, "m/s")}
     part = Part("a law that falls", ("force", "N"), shapes)
     form = Form("stribeck_friction", "damper", "force", 0, (part,), "that falls from its breakaway")
-    found = catalogue.fitted(form, [(10.0, part)], Motion((), 1e-3, 0.1, 2e-3, 0.2)).kind
-    assert found == kind and catalogue.has_file_of(found, form.kind) is bool(kind)
+    assert catalogue.fitted(form, [(10.0, part)], Motion((), 1e-3, 0.1, 2e-3, 0.2)).kind == kind

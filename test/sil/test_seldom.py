@@ -37,7 +37,7 @@ def test_no_block_has_what_only_noise_of_an_input_moves(tmp_path) -> None:
 
     def bench(road: float) -> SimpleNamespace:
         return SimpleNamespace(
-            base=SimpleNamespace(inputs=[SimpleNamespace(noise=road)]), noise=np.array([1e-5]), records=[record], update=3
+            base=SimpleNamespace(inputs=[SimpleNamespace(noise=road)]), noise=np.array([1e-5, 1e-5]), records=[record], update=3
         )
 
     moving = Blocks.moving(bench(noise)).number

@@ -6,7 +6,8 @@ test/diagnosis/reliability.py --take-over keeps in templates/."""
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,18 +21,32 @@ TABLE = resource("penode_sil.diagnosis", "templates", "reliability.json")  # bes
 def trust(explained: float, table: Path | None = None) -> float:
     """How likely the best explanation of the catalogue is right that takes away this share of the avoidable residual: the share that was,
     of the posterior of those which took about as much."""
-    return float(_level(explained, table)["share"])
+    return float(level(_levels(table), explained)["share"])
 
 
 def is_likely(explained: float, table: Path | None = None) -> bool:
     """Were answers that took about this share of the avoidable residual more often right than wrong?"""
-    level = _level(explained, table)
+    return mostly_right(level(_levels(table), explained))
+
+
+def trusted(cause: Cause, explained: float) -> Cause:
+    """A cause of an answer that takes this share of the avoidable residual, its posterior times the trust in such answers."""
+    return replace(cause, confidence=trust(explained) * cause.confidence)
+
+
+def level(levels: Sequence[Mapping[str, Any]], explained: float) -> Mapping[str, Any]:
+    """The one of these levels of trust, the highest first, that an answer is on which takes this share."""
+    return next((x for x in levels if explained >= x["explained"]), levels[-1])
+
+
+def mostly_right(level: Mapping[str, Any]) -> bool:
+    """Were more of the causes on a level right than wrong?"""
     return bool(level["right"] > level["named"] - level["right"])
 
 
-def _level(explained: float, table: Path | None) -> dict[str, Any]:
+def _levels(table: Path | None) -> list[dict[str, Any]]:
     levels: list[dict[str, Any]] = json.loads((table or TABLE).read_text(encoding="utf-8"))["trust"]
-    return next((x for x in levels if explained >= x["explained"]), levels[-1])
+    return levels
 
 
 def reliability(causes: Sequence[Cause], explained: float, table: Path | None = None) -> dict[str, Any] | None:

@@ -128,7 +128,7 @@ class Diagnosis:
     residual: dict[str, Any] = field(default_factory=dict)
     absorbed: dict[str, Any] = field(default_factory=dict)  # the same effect as a set of the running code, see absorb.py
     explanations: tuple[dict[str, Any], ...] = ()  # sets of causes that the recordings cannot tell apart, each with its posterior
-    unlikely: dict[str, Any] = field(default_factory=dict)  # causes without a name, for what explains as little is seldom right
+    unlikely: dict[str, Any] = field(default_factory=dict)  # causes not named: such answers were wrong at least as often as right
     reliability: dict[str, Any] | None = None  # how often causes that were named as surely were right, see reliability.py
     advice: tuple[str, ...] = ()  # what to do next, the most useful first
     figures: tuple[Figure, ...] = ()  # of the written model, see checks

@@ -20,7 +20,7 @@ from .evidence.bench import UNSTATED
 from .extend import absorb, applied, measuring, nameless
 from .extend.resolving import resolved
 from .plant import plant
-from .reliability import is_likely, trust
+from .reliability import is_likely, trust, trusted
 from .result import EXTENDED, UNKNOWN, Cause, Diagnosis, Gain, Named, place
 from .search import naming
 from .search.worth import WORTH
@@ -139,7 +139,7 @@ def _judged(study: Study, measured: Study, found: naming.Answer, after: Sequence
         verdict, causes = "unexplained", ()
     if coarse and verdict != "unexplained":
         causes, verdict = (*causes, coarse), "explained" if verdict == "no_discrepancy" else verdict
-    causes = tuple(_trusted(c, share) for c in causes)
+    causes = tuple(trusted(c, share) for c in causes)
     likely = [(names, trust(share) * p) for names, p in found.explanations]
     sets, tone = _explanations(causes, likely), tones.tone(study.experiments, study.metrics, after)
     verdict, causes = beside_faults(verdict, causes, faults, tone.detected)
@@ -153,13 +153,8 @@ def _likely(causes: tuple[Cause, ...], share: float) -> tuple[tuple[Cause, ...],
     if not causes or is_likely(share):
         return causes, {}, []
     names = " and ".join(place(c.kind, c.where) for c in causes)
-    note = f"{names} would explain {share:.0%} of the avoidable residual: what explains as little is seldom right; it is in {EXTENDED}"
-    return (), {"explained": share, "trust": trust(share), "causes": [asdict(_trusted(c, share)) for c in causes]}, [note]
-
-
-def _trusted(cause: Cause, share: float) -> Cause:
-    """A cause of an answer that takes this share of the avoidable residual, as sure as such answers are."""
-    return replace(cause, confidence=trust(share) * cause.confidence)
+    note = f"{names} would explain {share:.0%} of the avoidable residual; such answers were wrong at least as often as right"
+    return (), {"explained": share, "trust": trust(share), "causes": [asdict(trusted(c, share)) for c in causes]}, [note]
 
 
 def _better(written: Written) -> bool:

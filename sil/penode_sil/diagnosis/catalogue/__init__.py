@@ -55,14 +55,10 @@ def aside(form: Form) -> Form | None:
 
 
 def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> Form:
-    """A form under the name that it has with its laws as they are fitted: a friction with hardly a peak is none of Stribeck's."""
+    """A form under the name that it has with its laws as they are fitted: a friction with hardly a peak is none of Stribeck's. The kind
+    is empty where another form has that curve with fewer values."""
     named = getattr(OF[form.kind], "fitted", None)
     return replace(form, kind=named(form, laws, motion)) if named else form
-
-
-def has_file_of(kind: str, other: str) -> bool:
-    """Are two kinds of one file? What a fit has made a form of another file, that file has as a form with fewer values."""
-    return OF.get(kind) is OF.get(other)
 
 
 def stem(kind: str) -> str:

@@ -88,7 +88,7 @@ def _fading(motion: Motion) -> Iterable[Part]:
     for works, share in product(WORKS, COOLINGS):
         work = (works * motion.v_rms**2 * motion.longest, "m^2/s")
         shapes = {"work": work, "cooling": (share * motion.longest, "s")}
-        yield Part("heating_damper", gain, shapes, -1, ("work",), share / QUICKEST, later={"work": 100.0})
+        yield Part("heating_damper", gain, shapes, -1, span=share / QUICKEST, later={"work": 100.0})
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

@@ -79,8 +79,8 @@ class Motion:
 @dataclass(frozen=True, eq=False)
 class Part:
     """One law of a form: a named one (penode_gen.laws), or an expression of s, v and its arguments. `gain`: which argument multiplies it,
-    with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values, but those that
-    are fitted `later`, within a factor, once the form is accepted: before, its gain would be poorly known beside them. A shape stays within
+    with its unit; `shapes`: the others, value and unit; `sign` of the gain (0: either); `fixed` shapes are no free values; those
+    of `later` are, within a factor, once the form is accepted: before, its gain would be poorly known beside them. A shape stays within
     a factor of `span`: a bend that is far below the motion is an edge, and another kind. `edge`: a shape that only rounds a jump, within a
     factor of `rounds`, and may become as small as recordings ask for once the form is accepted. `kind`: what the law is by itself, where
     that is another cause. `load`: the expression whose magnitude an expression calls `load`. `includes`: a law that it has the curve of
@@ -105,7 +105,7 @@ class Part:
     @property
     def loose(self) -> list[str]:
         """Its shapes that are free values."""
-        return [name for name in self.shapes if name not in self.fixed]
+        return [name for name in self.shapes if name not in self.fixed and name not in self.later]
 
     def along(self, m: Moved) -> Array:
         """Force [n] for gain 1."""
@@ -183,8 +183,8 @@ class Kind(Protocol):
 
     @staticmethod
     def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> str:
-        """The kind of a form with its laws as they are fitted, each with its gain, empty where they are no form of this file; a file may be
-        without this."""
+        """The kind of a form with its laws as they are fitted, each with its gain, empty where another form has their curve with fewer
+        values; a file may be without this."""
         return form.kind
 
     @staticmethod

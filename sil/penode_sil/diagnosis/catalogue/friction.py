@@ -112,7 +112,7 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         yield Form(KINDS[2], place.loss, "force", index, (bends,))
         yield Form(KINDS[2], place.loss, "force", index, (replace(bends, law=DAHL),), "of Dahl")
         shapes = {**bends.shapes, "bend": (0.5, "1"), "share": (0.7, "1")}  # its exponent is fitted, about 1.2 to 2.5
-        loop = Part("bouc_wen_loop", bends.gain, shapes, 1, ("share",), span=3.0, includes=bends.law, later={"share": 1.0 / 0.7})
+        loop = Part("bouc_wen_loop", bends.gain, shapes, 1, span=3.0, includes=bends.law, later={"share": 1.0 / 0.7})
         yield Form(KINDS[2], place.loss, "force", index, (loop,), "of any exponent")
         for width in PEAKS if share < WAYS[-1] else ():
             yield Form(KINDS[1], place.loss, "force", index, (replace(bends, includes=DAHL), peak(motion, width)), "with bristles")

@@ -8,7 +8,7 @@ from dataclasses import replace
 from penode_gen.model import Model
 
 from ..plant.plant import Place
-from . import bushings, friction
+from . import friction
 from .form import Form, Motion, Part, Sizes
 
 KINDS = ("backlash",)
@@ -51,10 +51,10 @@ def aside(form: Form) -> Form | None:
 
 
 def fitted(form: Form, laws: Sequence[tuple[float, Part]], motion: Motion) -> str:
-    """See Kind. A damper with hardly a play, beside the rms deflection of its contact, has an elastic mount."""
+    """See Kind. A damper with hardly a play, beside the rms deflection of its contact, has an elastic mount (bushings) and no play."""
     shapes = laws[0][1].shapes
     contact = motion.v_rms * shapes["relaxation"][0] if "relaxation" in shapes else 0.0
-    return bushings.KINDS[0] if contact and shapes["gap"][0] < friction.LEAST * contact else form.kind
+    return "" if contact and shapes["gap"][0] < friction.LEAST * contact else form.kind
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:

@@ -20,7 +20,7 @@ from .. import catalogue
 from ..catalogue import drives, values as of_values
 from ..catalogue.friction import turns
 from ..evidence.bench import with_tolerances
-from ..reliability import trust
+from ..reliability import trusted
 from ..report.figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, UNKNOWN, Cause, place
 from ..search.worth import RATIO
@@ -158,7 +158,7 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
     if end.withheld and (whole or clear):
         names = [place(c.kind, c.where) for c in end.withheld]
         notes = tuple(n for n in d.notes if not any(n.startswith(f"{name} is real but small") for name in names))
-        causes = tuple(replace(c, confidence=trust(d.explained) * c.confidence) for c in end.withheld)
+        causes = tuple(trusted(c, d.explained) for c in end.withheld)
         sets = ({"causes": [{"kind": c.kind, "where": c.where} for c in causes], "posterior": min(c.confidence for c in causes)},)
         return replace(end, answer=replace(d, causes=causes, explanations=sets, notes=notes))
     if found := values.few(case, end, table):

@@ -48,8 +48,8 @@ class Blocks:
     def moving(bench: Bench) -> Blocks:
         """Of the recordings of a bench."""
         lengths = [len(r) // bench.update for r in bench.records]
-        noise = np.array([i.noise for i in bench.base.inputs])
-        return Blocks.of(lengths, np.concatenate([resting(bench, r, noise) for r in bench.records]) if noise.any() else None)
+        noisy = any(i.noise for i in bench.base.inputs)
+        return Blocks.of(lengths, np.concatenate([resting(bench, r) for r in bench.records]) if noisy else None)
 
     def scores(self, problem: Problem, fit: Fit) -> Array:
         """Log predictive density [blocks] of each block by the fit of the others."""
@@ -71,10 +71,10 @@ class Blocks:
         return best
 
 
-def resting(bench: Bench, record: Record, noise: Array) -> NDArray[np.bool_]:
-    """At which updates nothing moves but `noise` [n_u] of the inputs, by the rms of all signals over a period of the motion: only a
+def resting(bench: Bench, record: Record) -> NDArray[np.bool_]:
+    """At which updates nothing moves but noise, by the rms of all signals over a period of the motion: only a
     simulation follows that, and a friction that holds it still predicts better."""
-    moves = np.zeros(len(record), bool)
+    moves, noise = np.zeros(len(record), bool), np.array([i.noise for i in bench.base.inputs])
     for x, size in ((record.u, noise), (record.y, bench.noise)):
         x = np.where(np.isfinite(x).any(axis=0), x, 0.0)  # a sensor that this recording lacks is at rest
         x = np.nan_to_num(x - np.nanmedian(x, axis=0))

@@ -55,11 +55,11 @@ def steepened(bench: Bench, term: Term) -> Bench:
 
 def loosened(bench: Bench, term: Term) -> tuple[Bench, Term]:
     """Fits what a term's laws leave to be fitted later, where that gains PROMISE."""
-    more = [
-        Free(f"{name}_{key}", x, x, log=True, sigma=1.0, origin=x, low=x / most, high=x * most)
-        for name, part in zip(term.elements, term.form.parts, strict=True)
-        for key, most, x in ((key, most, part.shapes[key][0]) for key, most in part.later.items())
-    ]
+    more = []
+    for name, part in zip(term.elements, term.form.parts, strict=True):
+        for key, factor in part.later.items():
+            x = part.shapes[key][0]
+            more.append(Free(f"{name}_{key}", x, x, log=True, sigma=1.0, origin=x, low=x / factor, high=x * factor))
     fit = bench.problem().solve((*bench.fit.free, *more), bench.fit.by, FOLLOWED) if more else bench.fit
     if not fit.cost > bench.fit.cost + PROMISE:
         return bench, term

@@ -35,8 +35,9 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score
     y = y[np.isfinite(y)]
     if not np.any(y > 0.0):
         return []
-    piled = np.quantile(y, SHARES[0]) >= least(bench, index)
-    limits = [max(float(x), least(bench, index)) for x in (*np.quantile(y, SHARES), 1.1 * np.max(y)) if x > 0.0]
+    low = least(bench, index)
+    piled = np.quantile(y, SHARES[0]) >= low
+    limits = [max(float(x), low) for x in (*np.quantile(y, SHARES), 1.1 * np.max(y)) if x > 0.0]
 
     def gained(sizes: Sequence[float], sharp: float) -> list[float]:
         changes = []

@@ -80,8 +80,8 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None], sti
     ranked = sorted([*ranked, *limits, *actuators], key=lambda pair: -pair[0].gain)
     chosen = _chosen(ranked)
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
-    tried = [(form, _fitted(bench, base, form, moved, terms, s.sizes)) for s, form in chosen]
-    trials = [t for form, t in tried if catalogue.has_file_of(t.form.kind, form.kind)]
+    trials = [_fitted(bench, base, form, moved, terms, s.sizes) for s, form in chosen]
+    trials = [t for t in trials if t.form.kind]
     trials += [_fitted(bench, base, form, moved, terms, np.ones(1)) for form in _holds(bench, trials, terms)]
     trials += _of_all(bench, base, trials, moved, terms)
     return sorted(trials, key=lambda t: -t.gain)

@@ -168,9 +168,12 @@ def terms_of(accepted: Sequence[Accepted]) -> list[Term]:
 def _adopted(bench: Bench, best: Trial, good: Sequence[Trial], number: int) -> tuple[Trial, Bench, list[Term]]:
     """Adopts the best trial, or one of the same name with as many values, if that fits better with its edges as steep as they are: a peak
     that falls more slowly makes up for an edge that is too wide."""
-    alike = [best, *(t for t in good if t is not best and name_of(t) == name_of(best) and len(t.term.free) == len(best.term.free))]
-    tried = [(t, *adopt(bench, t, number)) for t in alike if t is best or all(any(p.edge for p in x.form.parts) for x in (t, best))]
-    return max(tried, key=lambda x: x[1].fit.cost)
+
+    def likeness(t: Trial) -> tuple[object, ...]:
+        return name_of(t), len(t.term.free), any(p.edge for p in t.form.parts)
+
+    alike = [t for t in good if t is best or (likeness(t) == likeness(best) and any(p.edge for p in t.form.parts))]
+    return max(((t, *adopt(bench, t, number)) for t in alike), key=lambda x: x[1].fit.cost)
 
 
 def _hidden(t: Trial, small: Trial) -> bool:
