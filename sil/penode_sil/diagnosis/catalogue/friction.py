@@ -3,6 +3,7 @@
 """Dry friction: of Coulomb, with a constant force beside it or a peak at low rates, with memory of the travel, by position or by load."""
 
 import itertools
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -153,7 +154,7 @@ def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
     force = ("N", v(0, "force"))
     match form.kind:
         case "stribeck_friction" if "rise" in form.parts[0].shapes:
-            left = np.sqrt(np.e - 1.0) if form.note == SLOWLY else 1.0  # 1/e
+            left = math.sqrt(math.e - 1.0) if form.note == SLOWLY else 1.0  # 1/e
             rates = {"stribeck_rate": ("m/s", left * v(0, "stribeck"))}
             return {"breakaway": ("N", v(0, "force") * (1.0 + v(0, "rise"))), "coulomb": force, **rates}
         case "stribeck_friction":
