@@ -9,29 +9,35 @@ from types import SimpleNamespace
 import pytest
 
 from penode_sil.diagnosis import verdict
+from penode_sil.diagnosis.catalogue import drives
 from penode_sil.diagnosis.result import Cause, Value
 
+UNITS = {"m": "kg", "c": "N/m", "d": "N*s/m", "delay": "s"}
 
-def plant(unit: str = "N", inputs: int = 1, tolerance: float = 0.03) -> SimpleNamespace:
+
+def plant(unit: str = "N", inputs: int = 1, sensor: str = "m", tolerance: float = 0.03) -> SimpleNamespace:
     """A mass on spring and damper, each known to 3 %."""
     return SimpleNamespace(
-        parameters={k: SimpleNamespace(value=v, tolerance=tolerance) for k, v in {"m": 50.0, "c": 3e4, "d": 900.0}.items()},
+        parameters={k: SimpleNamespace(value=v, tolerance=tolerance) for k, v in {"m": 50.0, "c": 3e4, "d": 900.0, "delay": 0.01}.items()},
         bodies=[SimpleNamespace(mass="m")],
         inputs=[SimpleNamespace(name="push", unit=unit)] * inputs,
+        sensors=[SimpleNamespace(name="x", unit=sensor)],
     )
 
 
-def wrong(model: SimpleNamespace, **factors: float) -> tuple[Cause, ...]:
-    """Causes by parameters that are so many times what the file has, known to 2 %."""
+def fitted(model: SimpleNamespace, **factors: float) -> dict[str, Value]:
+    """Parameters that are so many times what the file has, known to 2 %."""
     sizes = {k: model.parameters[k].value * f for k, f in factors.items()}
-    return tuple(Cause("wrong_parameter", k, {k: Value(v, "1", (0.98 * v, 1.02 * v))}, 0.99) for k, v in sizes.items())
+    return {k: Value(v, UNITS[k], (0.98 * v, 1.02 * v)) for k, v in sizes.items()}
+
+
+def gain_of(model: SimpleNamespace, limit: float = 0.03, **factors: float) -> Cause | None:
+    return drives.common_gain(model, fitted(model, **factors), dict.fromkeys(factors, limit))
 
 
 def test_one_factor_is_the_gain_of_the_input():
-    model = plant()
-    delay = Cause("sensor_delay", "x", {"delay": Value(1e-3, "s", (9e-4, 1.1e-3))}, 0.9)
-    (gain, other), notes = verdict._plausible(model, (*wrong(model, m=1.37, c=1.35, d=1.39), delay))
-    assert (gain.kind, gain.where, other) == ("input_gain", "push", delay) and "by a common factor" in notes[0]
+    gain = gain_of(plant(), m=1.37, c=1.35, d=1.39, delay=1.0)
+    assert gain is not None and (gain.kind, gain.where) == ("input_gain", "push")
     # weights are those of intervals 4 % of each factor wide; truth: their mean is within a tenth of a per cent of 1.37
     assert gain.parameters["gain"].value == pytest.approx(1.0 / 1.37, rel=2e-3)
     low, high = gain.parameters["gain"].ci95
@@ -42,26 +48,24 @@ def test_one_factor_is_the_gain_of_the_input():
 @pytest.mark.parametrize(
     "model, factors",
     [
-        (plant(), {"m": 1.37, "c": 1.25}),  # by several factors
-        (plant(), {"c": 1.37, "d": 1.37}),  # the mass is as the file has it: forces are known
+        (plant(), {"m": 1.37, "c": 1.25, "d": 1.3}),  # by several factors
+        (plant(), {"m": 1.37, "c": 1.37, "d": 1.0}),  # one is as the file has it
+        (plant(), {"m": 1.37, "c": 1.0, "d": 1.0}),  # one is off
+        (plant(), {"c": 1.37, "d": 1.37}),  # the mass is exact, or not known at all
+        (plant(), {"m": 1.02, "c": 1.03, "d": 1.01}),  # within tolerance
         (plant("m"), {"m": 1.37, "c": 1.37}),  # a road has no gain of forces
         (plant(inputs=2), {"m": 1.37, "c": 1.37}),
+        (plant(sensor="N"), {"m": 1.37, "c": 1.37}),  # a load cell shows the forces themselves
     ],
 )
-def test_other_factors_are_another_plant(model, factors):
-    causes, notes = verdict._plausible(model, wrong(model, **factors))
-    assert causes == () and "another plant" in notes[0]
+def test_other_factors_are_parameters(model, factors):
+    assert gain_of(model, **factors) is None
 
 
-def test_without_tolerances_one_factor_is_a_gain_too_and_several_are_parameters():
-    model = plant(tolerance=0.0)
-    (gain,), _ = verdict._plausible(model, wrong(model, m=1.17, c=1.18))
-    assert (gain.kind, gain.where) == ("input_gain", "push")
-    causes = wrong(model, m=1.17, c=1.40)
-    assert verdict._plausible(model, causes) == (causes, [])
-
-
-def test_one_parameter_is_itself():
+def test_several_parameters_out_of_tolerance_are_another_plant():
     model = plant()
-    causes = wrong(model, m=1.37)
-    assert verdict._plausible(model, causes) == (causes, [])
+    causes = tuple(Cause("wrong_parameter", n, {n: v}, 0.99) for n, v in fitted(model, m=1.37, c=1.25).items())
+    assert verdict._plausible(model, causes[:1]) == (causes[:1], [])
+    left, notes = verdict._plausible(model, causes)
+    assert left == () and "another plant" in notes[0]
+    assert verdict._plausible(plant(tolerance=0.0), causes) == (causes, [])

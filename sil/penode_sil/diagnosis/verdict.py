@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model
 
-from .catalogue import drives, others, values as of_values
+from .catalogue import others, values as of_values
 from .checks import leftover, numerics, plausible, tones
 from .checks.case import Case, End
 from .checks.written import write_extended
-from .evidence.bench import UNSTATED
 from .extend import absorb, applied, measuring, nameless
 from .extend.resolving import resolved
 from .plant import plant
@@ -242,15 +241,10 @@ def _verdict(tried: Sequence[Cause], causes: tuple[Cause, ...], share: float, qu
 
 def _plausible(model: Model, causes: tuple[Cause, ...]) -> tuple[tuple[Cause, ...], list[str]]:
     """Causes, without parameters where several have left tolerances that the file states: alone that is another plant, beside other causes
-    these are not quite of their textbook form; and a note on it. All by one factor, they are the gain of an input that the file lacks."""
+    these are not quite of their textbook form; and a note on it."""
     off = [c for c in causes if of_values.is_one(c) and model.parameters[c.where].tolerance <= 1.0]
     if len(off) < 2:
         return causes, []
-    if gain := drives.common_gain(model, off, UNSTATED):
-        names = ", ".join(c.where for c in off)
-        return (gain, *(c for c in causes if c not in off)), [
-            f"{names} changed by a common factor have the same effect; model_extended.toml has that form"
-        ]
     stated = [c.where for c in off if model.parameters[c.where].tolerance > 0.0]
     if len(stated) < 2:
         return causes, []

@@ -2,7 +2,7 @@
 # Copyright (c) 2026 the penode authors
 """Inputs that differ from the excitation of the plant, and sensors that differ from its motion."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from penode_gen import units
 from penode_gen.model import Model
 
-from ..result import Cause, Named, Value
+from ..result import Cause, Value
+from . import values as of_values
 from .actuators import ACTUATORS, Drive
 from .form import Form, Sizes
 
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 INPUTS = (*ACTUATORS, "input_hold")
 SENSORS = ("sensor_scale", "sensor_delay")
 OFFSET = "input_offset"
+FORCES = ("N", "N*m")
 KINDS = (*INPUTS, *SENSORS)
 MEANING = {
     "input_gain": "The input that drives the plant is larger, or smaller, than its recording by a factor.",
@@ -131,18 +133,26 @@ def of_input(unit: str, own: str) -> str:
     return own + unit if unit in ("", "/s") else unit
 
 
-def common_gain(model: Model, off: Sequence[Cause], unstated: float) -> Cause | None:
-    """The gain of the only input, a force, that does what parameters do together: with all masses among them, by one factor, beside which
-    each is within its tolerance (`unstated` where the file has none). A sensor of motion shows forces over masses only."""
-    forces = [i for i in model.inputs if units.si(i.unit) in ("N", "N*m")]
-    if len(model.inputs) != 1 or not forces or not {b.mass for b in model.bodies} <= {c.where for c in off}:
+def common_gain(model: Model, fitted: Mapping[str, Value], limits: Mapping[str, float]) -> Cause | None:
+    """The gain of the only input, a force, that does what the parameters in `fitted` do together: all masses among them, and two or more
+    beyond their relative `limits`, but by one factor, beside which none is. Sensors of motion show forces over masses only."""
+    forces = [i for i in model.inputs if units.si(i.unit) in FORCES]
+    seen = [s.name for s in model.sensors if units.si(s.unit) in FORCES]
+    own = {n: v for n, v in fitted.items() if any(u in v.unit for u in ("N", "kg"))}
+    nominal = {n: model.parameters[n].value for n in own}
+    off = [n for n, v in own.items() if _is_off(v, nominal[n], limits[n])]
+    if len(model.inputs) != 1 or not forces or seen or len(off) < 2 or not {b.mass for b in model.bodies} <= own.keys():
         return None
-    values = [(c.parameters[c.where], model.parameters[c.where]) for c in off]
-    low, high = (np.array([v.ci95[k] / p.value for v, p in values]) for k in (0, 1))
+    low, high = (np.array([own[n].ci95[k] / nominal[n] for n in off]) for k in (0, 1))
     weights = 1.0 / np.maximum(high - low, 1e-300) ** 2
     factor = float(np.sum(weights * 0.5 * (low + high)) / np.sum(weights))
-    if factor <= 0.0 or any(abs(v.value / p.value / factor - 1.0) > (p.tolerance or unstated) for v, p in values):
+    if factor <= 0.0 or any(_is_off(v, factor * nominal[n], limits[n]) for n, v in own.items()):
         return None
     gain = Value(1.0 / factor, "1", (1.0 / float(np.max(high)), 1.0 / float(np.min(low))))  # what a model leaves out moves each another way
-    others = tuple(Named(c.kind, c.where) for c in off[:3])
-    return Cause("input_gain", forces[0].name, {"gain": gain}, min(c.confidence for c in off), others)
+    return Cause("input_gain", forces[0].name, {"gain": gain}, 1.0, tuple(of_values.named(n) for n in off[:3]))
+
+
+def _is_off(value: Value, nominal: float, limit: float) -> bool:
+    """Is an interval farther from a nominal value than this share of it?"""
+    far = limit * abs(nominal)
+    return not value.ci95[0] - far <= nominal <= value.ci95[1] + far

@@ -6,7 +6,7 @@ missing."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from penode_gen import units
 from penode_gen.model import Model, Parameter
 
 from .. import catalogue
-from ..catalogue import values as of_values
+from ..catalogue import drives, values as of_values
 from ..catalogue.form import Motion
 from ..evidence.bench import UNSTATED
 from ..evidence.fit import Fit
@@ -25,6 +25,9 @@ from .innovate import Found
 from .rounds import terms_of
 from .terms import Term
 from .worth import Z_95, least, shift, systematic, undetermined
+
+
+COMMON = "masses, stiffnesses and dampings that are off by a common factor have the same effect; model_extended.toml has that form"
 
 
 @dataclass(frozen=True)
@@ -39,17 +42,18 @@ class Judged:
 
 def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float, log: Callable[[str], None]) -> Judged:
     """Judges each parameter by its value beside the named forms alone, in a bench that has moved along `moved`, and by its value beside all
-    forms that were found. Causes have this `confidence`."""
+    forms that were found. Causes have this `confidence`. All by one factor, they are the gain of an input that the file lacks."""
     plain, whole = found.plain.fit, found.bench.fit.values
     shared = straight.beside(model, found.plain, _straight(terms_of(found.named)), moved)
+    if gain := _common_gain(model, found, moved, shared):
+        return Judged((replace(gain, confidence=confidence),), (COMMON,), ())
     shared_by_all = straight.beside(model, found.bench, _straight(found.terms), moved)
     causes, notes, absorbed = [], [], []
     for p in model.parameters.values():
         if p.name not in whole or np.isinf(p.tolerance):
             continue
-        size, value, beside, unit = shift(model, found.plain, moved, p.name), plain.value(p.name), whole[p.name], units.si(p.unit)
-        bent = systematic(found.possible)
-        sd = float(np.hypot(plain.deviation(p.name), bent / max(size, bent, 1e-300) * abs(value - p.value)))
+        value, beside, unit = plain.value(p.name), whole[p.name], units.si(p.unit)
+        size, sd = _known(model, found, moved, p)
         log(f"{p.name}: {value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of the force there")
         if abs(value - p.value) <= _limit(p) * abs(p.value) + Z_95 * sd:
             continue
@@ -66,8 +70,23 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
                 f"and {beside:.4g} with them: within its tolerance"
             )
         else:
-            causes.append(_cause(p, value, sd, shared, confidence))
+            causes.append(of_values.cause(p.name, _size(p, value, sd, shared), confidence))
     return Judged(tuple(causes), tuple(notes), tuple(absorbed))
+
+
+def _known(model: Model, found: Found, moved: Sequence[Motion], p: Parameter) -> tuple[float, float]:
+    """The share of the force there that changes with a parameter as fitted beside the named forms, and the deviation of its value."""
+    fit, size, bent = found.plain.fit, shift(model, found.plain, moved, p.name), systematic(found.possible)
+    return size, float(np.hypot(fit.deviation(p.name), bent / max(size, bent, 1e-300) * abs(fit.value(p.name) - p.value)))
+
+
+def _common_gain(model: Model, found: Found, moved: Sequence[Motion], shared: Mapping[str, straight.Slopes]) -> Cause | None:
+    """The gain of an input that does what parameters do together, see there; none where that is no more than unmodelled effects can do."""
+    fit = found.plain.fit
+    free = [p for p in model.parameters.values() if p.name in fit.values and np.isfinite(p.tolerance)]
+    values = {p.name: _size(p, fit.value(p.name), _known(model, found, moved, p)[1], shared) for p in free}
+    gain = drives.common_gain(model, values, {p.name: _limit(p) for p in free})
+    return gain if gain and abs(gain.parameters["gain"].value - 1.0) >= least(found.possible, 0.0) else None
 
 
 def _straight(terms: Sequence[Term]) -> list[Term]:
@@ -91,8 +110,7 @@ def _limit(p: Parameter) -> float:
     return p.tolerance if p.tolerance > 0.0 else UNSTATED
 
 
-def _cause(p: Parameter, value: float, sd: float, shared: Mapping[str, straight.Slopes], confidence: float) -> Cause:
-    """The parameter as a cause, with the slopes that laws at its place share with it."""
+def _size(p: Parameter, value: float, sd: float, shared: Mapping[str, straight.Slopes]) -> Value:
+    """A parameter with its interval, with the slopes that laws at its place share with it."""
     least, most = shared.get(p.name, (0.0, 0.0))
-    size = Value(value + 0.5 * (least + most), units.si(p.unit), (value - Z_95 * sd + least, value + Z_95 * sd + most))
-    return of_values.cause(p.name, size, confidence)
+    return Value(value + 0.5 * (least + most), units.si(p.unit), (value - Z_95 * sd + least, value + Z_95 * sd + most))
