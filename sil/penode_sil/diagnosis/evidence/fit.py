@@ -17,7 +17,7 @@ from .prior import cost, precisions, slopes as prior_slopes
 
 Array = NDArray[np.float64]
 DAMPING = np.array([0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
-MOVE = 1e-3  # of a unit: finite differences
+MOVE = 1e-6  # of a unit: finite differences. Larger ones make a common scale of all forces, or a common offset, seem to bend what is seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,12 +123,10 @@ class Problem:
 
     def at(self, free: Sequence[Free], by: Filter) -> Fit:
         """The fit that ends at these free values."""
-        # larger ones of a logarithm would make a common scale of all forces seem to bend what is seen
-        small = np.array([MOVE * MOVE if f.log else MOVE for f in free])
-        shifts = np.vstack([np.zeros(len(free)), np.diag(small)])
+        shifts = np.vstack([np.zeros(len(free)), MOVE * np.eye(len(free))])
         for i, f in enumerate(free):
-            if f.at(small[i]) == f.value:
-                shifts[i + 1, i] = -small[i]
+            if f.at(np.array(MOVE)) == f.value:
+                shifts[i + 1, i] = -MOVE
         nu = self.nu(free, shifts, by)
         used = np.isfinite(nu[0])
         moves = np.array([shifts[i + 1, i] for i in range(len(free))])
