@@ -17,7 +17,7 @@ from penode_sil.diagnosis.catalogue.form import Form, Motion, Part
 from penode_sil.diagnosis.evidence.prior import Stated
 from penode_sil.diagnosis.plant import plant
 from penode_sil.diagnosis.result import Cause, Value
-from penode_sil.diagnosis.search import innovate, propose, rounds
+from penode_sil.diagnosis.search import innovate, naming, propose, rounds
 from penode_sil.diagnosis.search.terms import Term, Trial
 
 PLANT = """
@@ -96,6 +96,26 @@ def test_of_curves_that_predict_equally_well_the_one_with_fewer_values_is_named(
     stop, cube = trial("bump_stop", 100.0, LATE, free=2), trial("cubic_spring", 98.0, LOOSE)
     assert rounds.simplest([stop, cube], BASE, []) is cube  # 8 nats less, of 10 that a value has to gain
     assert rounds.simplest([stop, trial("cubic_spring", 95.0, LOOSE)], BASE, []) is stop
+
+
+def test_a_form_that_takes_values_of_the_file_away_counts_these_too():
+    """A spring and a damper in series beside a mass of twice its size predict better than a lag by a twentieth: four values for one."""
+    values = [Stated(n, f * 10.0, 1.0, sigma=0.25, origin=10.0) for n, f in (("m", 2.0), ("d", 1.4))]
+
+    def both(nats: float, *moved: Stated) -> list[SimpleNamespace]:
+        fit = SimpleNamespace(free=moved, deviation=lambda target: 0.1)
+        return [SimpleNamespace(**{**vars(trial("maxwell_bushing", nats, LATE, free=2)), "fit": fit}), trial("input_lag", 100.0, where="u")]
+
+    for nats, moved, kind in ((105.0, values, "input_lag"), (105.0, [], "maxwell_bushing"), (130.0, values, "maxwell_bushing")):
+        assert rounds.simplest(both(nats, *moved), BASE, []).form.kind == kind
+    assert rounds._is_imitated(*reversed(both(105.0, *values)), BASE) and not rounds._is_imitated(*reversed(both(105.0)), BASE)
+
+
+def test_a_passed_rival_with_more_values_is_as_likely_as_the_form_that_was_chosen():
+    rival, chosen, worse = trial("maxwell_bushing", 105.0, LATE), trial("input_lag", 100.0, where="u"), trial("backlash", 50.0, LOOSE)
+    found = {f.kind: p for f, p in naming._weighed([rival, chosen, worse], chosen)}
+    assert found == {"maxwell_bushing": 0.5, "input_lag": 0.5, "backlash": 0.0}
+    assert dict((f.kind, p) for f, p in naming._weighed([rival, chosen], rival)) == {"maxwell_bushing": 1.0, "input_lag": 0.0}
 
 
 def test_a_place_is_the_same_by_either_of_its_names():

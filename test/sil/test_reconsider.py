@@ -14,6 +14,7 @@ import pytest
 
 from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence.gain import Level
+from penode_sil.diagnosis.evidence.prior import Stated
 from penode_sil.diagnosis.search import rounds
 from penode_sil.diagnosis.search.reconsider import needed, reconsidered
 from penode_sil.diagnosis.search.rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, _is_sure, simplest
@@ -82,7 +83,8 @@ def grown(forms: Sequence[Accepted], scores: dict[tuple[str, ...], float], rest:
     """An end of a search that `left` a share of all forces unmodelled. Good trials are left only where the last form is small, for the
     search goes on after a large one."""
     large = (*[True] * (len(forms) - 1), not rest)
-    return Grown(SimpleNamespace(level=Level(left, 0.01)), np.full(4, scores[kinds(forms)] / 4.0), tuple(forms), large, tuple(rest))
+    bench = SimpleNamespace(level=Level(left, 0.01), fit=forms[0].trial.fit if forms else None)
+    return Grown(bench, np.full(4, scores[kinds(forms)] / 4.0), tuple(forms), large, tuple(rest))
 
 
 def test_a_first_choice_that_stood_in_for_two_is_exchanged():
@@ -149,6 +151,23 @@ def test_a_search_begins_with_other_curves_too_where_forces_remain(left, gain, k
     rounds = Rounds(scores, {}, grow=lambda forms: [*forms, *more])
     end = reconsidered(rounds, grown([accepted(0, first, [spring, cubic])], scores, left=left))
     assert kinds(end.accepted) == (("constant_force",) if kept else ("asymmetric_damper", "bump_stop", "quadratic_damper"))
+
+
+@pytest.mark.parametrize("factor, gain, kept", [(1.6, 99.0, True), (1.6, 101.0, False), (1.0, 99.0, False)])
+def test_an_end_that_takes_a_mass_away_has_to_gain_as_much_as_a_curve_may_be_off(factor, gain, kept):
+    """A bushing beside a mass 60 % off predicts better than a delay: two laws and the mass for one value, so it has to gain a fifth of
+    what that one did, 500 nats. Where the mass stays, 20 nats are enough for two laws."""
+    delay, other = trial("constant", 600.0), trial("asymmetric", 595.0)
+    mass = Stated("m", factor * 10.0, 1.0, sigma=0.25, origin=10.0)
+    other = replace(other, fit=SimpleNamespace(free=(mass,), deviation=lambda target: 0.1))
+    scores = {("constant_force",): 600.0, ("asymmetric_damper", "cubic_spring"): 600.0 + gain}
+
+    def grow(forms: list[Accepted]) -> list[Accepted]:
+        return [*forms, accepted(1, trial("cubic", 620.0))]
+
+    first = grown([accepted(0, replace(delay, gain=500.0), [other])], scores, left=0.03)
+    end = reconsidered(Rounds(scores, {}, grow), first)
+    assert kinds(end.accepted) == (("constant_force",) if kept else ("asymmetric_damper", "cubic_spring"))
 
 
 def test_no_simpler_form_that_predicts_much_worse_and_no_end_that_is_worse():

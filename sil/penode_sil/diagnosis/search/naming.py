@@ -29,7 +29,7 @@ from ..study.noise import Experiment
 from . import innovate, offsets as offsets_of, parameters
 from .innovate import Found
 from .propose import FREE_RUN, motions
-from .rounds import MIN_TAKEN, name_of, terms_of
+from .rounds import MIN_TAKEN, name_of, of_curve, terms_of
 from .terms import Term, Trial
 from .worth import WORTH, Z_95, least, share, systematic, undetermined
 
@@ -99,7 +99,7 @@ def answer(
     withheld, notes = [], []
     named = terms_of(found.named)
     names = {name_of(a.trial) for a in found.named}
-    chances = {a.trial: _weighed([t for t in a.trials if name_of(t) not in names - {name_of(a.trial)}]) for a in found.named}
+    chances = {a.trial: _weighed([t for t in a.trials if name_of(t) not in names - {name_of(a.trial)}], a.trial) for a in found.named}
     for a, term in [(accepted, term) for accepted in found.named for term in accepted.terms]:
         enough, chance, first = least(found.level, a.trial.whole), chances[a.trial], term is a.terms[0]
         size = share(plain, [t for t in named if name_of(t) == name_of(term)], plain.fit, moved)
@@ -121,7 +121,7 @@ def answer(
             else f"{a.trial.share:.1%} of the force there"
         )
         notes.append(_small(a.terms[0], what))
-        sure = _sure(_weighed(a.trials), a.trial.form)
+        sure = _sure(_weighed(a.trials, a.trial), a.trial.form)
         withheld.append(_cause(model, after, moved, a.terms[0], a.trial.share, (), sure, found.level))
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
     shifts = np.full(len(noise), np.inf) if any(c.kind in stopped for c in causes) else offsets_of.shifts(after, found.run, found.terms)
@@ -169,11 +169,19 @@ def _merged(causes: list[Cause], new: Cause) -> list[Cause]:
     return [replace(c, parameters={**new.parameters, **c.parameters}) if c is same[0] else c for c in causes]
 
 
-def _weighed(trials: Sequence[Trial]) -> list[tuple[Form, float]]:
-    """Posterior of the names of a round: of each, its best form, summed over the forms of one name."""
+def _weighed(trials: Sequence[Trial], chosen: Trial) -> list[tuple[Form, float]]:
+    """Posterior of the names of a round: of each, its best form, summed over the forms of one name. A trial of another curve that predicts
+    better than the one that was chosen, for that takes fewer values, is as likely as that."""
     if not trials:
         return []
     chance = posterior([t.blocks for t in trials])
+    own = np.array([of_curve(t) == of_curve(chosen) for t in trials])
+    sums = np.array([np.sum(t.blocks) for t in trials])
+    passed = ~own & (sums > np.max(sums[own], initial=-np.inf))
+    if own.any() and passed.any():
+        whole = np.sum(chance[own]) + np.sum(chance[passed])
+        share = whole / (1.0 + np.sum(passed))
+        chance = np.where(passed, share, np.where(own, share / np.sum(own), chance))
     total: dict[tuple[str, str], float] = {}
     forms: dict[tuple[str, str], Form] = {}
     for t, p in zip(trials, chance, strict=True):

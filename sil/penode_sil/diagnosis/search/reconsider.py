@@ -15,7 +15,7 @@ from ..catalogue.form import Form
 from ..evidence.observer import bias
 from ..evidence.screening import Probe
 from .propose import as_it_is, is_part, motions
-from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, name_of, of_curve, scored, simplest, terms_of
+from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, moved, name_of, of_curve, scored, simplest, terms_of
 from .terms import Trial
 from .worth import Z_95, mostly, wrong
 
@@ -28,7 +28,7 @@ def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
     for first in _other_beginnings(grown, best) if best.bench.level.size > 0.0 else ():
         other = _exchanged(rounds, rounds.grow([first]))
         rounds.log(f"beginning with {name_of(first.trial)}: {_total(other) - _total(best):.0f} nats")
-        best = other if _is_better(other, best) else best
+        best = other if _is_better(other, best, grown.accepted[0].trial) else best
     for k, a in enumerate(best.accepted):
         single = [t for t in a.trials if len(t.form.kinds) == 1]
         if len(a.trial.form.kinds) > 1 and single:
@@ -36,7 +36,7 @@ def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
             other = _exchanged(rounds, rounds.grow([*best.accepted[:k], first]))
             names, gain = [name_of(x.trial) for x in other.accepted], _total(other) - _total(best)
             rounds.log(f"replacing the two-law form {name_of(a.trial)} by {names}: {gain:.0f} nats")
-            if _is_better(other, best):
+            if _is_better(other, best, grown.accepted[0].trial):
                 return other
     return best
 
@@ -54,10 +54,23 @@ def _other_beginnings(grown: Grown, best: Grown) -> list[Accepted]:
     return list(found.values())
 
 
-def _is_better(end: Grown, other: Grown) -> bool:
-    """Does an end gain MIN_GAIN beyond another one, and as much again for each law that it has more?"""
-    more = max(len(terms_of(end.accepted)) - len(terms_of(other.accepted)), 0)
-    return _total(end) - _total(other) > MIN_GAIN * (1 + more)
+def _is_better(end: Grown, other: Grown, first: Trial) -> bool:
+    """Does an end gain MIN_GAIN beyond another one, and as much again for each law that it has more, or anything with fewer? One that moves values of the file out
+    of their tolerances, and with these has more than twice as many values, has to gain MIN_FORM of what the first form did."""
+    gain, much = _total(end) - _total(other), max(MIN_GAIN, MIN_FORM * first.gain)
+    if _imitates(end, other):
+        return gain > much
+    if _imitates(other, end):
+        return gain > -much
+    more = max(len(terms_of(end.accepted)) - len(terms_of(other.accepted)), -1)
+    return gain > MIN_GAIN * (1 + more)
+
+
+def _imitates(end: Grown, other: Grown) -> bool:
+    """Does an end take more than twice the values of another one, with those of the file that it moves and the other does not?"""
+    laws, own = (sum(len(t.free) for t in terms_of(x.accepted)) for x in (other, end))
+    gone, left = (moved(a.bench.fit) - moved(b.bench.fit) for a, b in ((end, other), (other, end)))
+    return bool(gone) and 2 * (laws + len(left)) < own + len(gone)
 
 
 def centred(rounds: Rounds, grown: Grown) -> Grown:

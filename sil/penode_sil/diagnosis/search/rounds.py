@@ -15,9 +15,10 @@ from ..evidence.bench import SIZES, Bench, fit_level
 from ..evidence.blocks import BLOCKS, Blocks
 from ..evidence.fit import Fit, Problem
 from ..evidence.gain import Level
-from ..evidence.prior import Stated, stated
+from ..evidence.prior import SHARE, Stated, stated
 from ..evidence.screening import Probe
 from ..extend import late
+from ..study.fit import Target
 from . import holding
 from .adopting import adopt
 from .propose import FOLLOWED, PROMISE, is_part, motions, propose
@@ -140,7 +141,7 @@ class Rounds:
 
     def good(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> tuple[Trial, ...]:
         """Trials that predict left-out blocks better than `scores` by MIN_GAIN, the best first. If a large form predicts as well as the
-        best, to MIN_GAIN, only large ones; otherwise the large form only imitates a smaller one."""
+        best, to MIN_GAIN, and needs no more values, only large ones; otherwise the large form only imitates a smaller one."""
         trials = propose(bench, terms_of(accepted), self.log, self.stiffer)
         trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
         freest = sorted(trials, key=lambda t: -t.run)[:1]
@@ -155,8 +156,10 @@ class Rounds:
         good = [t for t, b in zip(trials, better, strict=True) if _accepted(bench, t, b)]
         good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
         matter = [t for t in good if _matters(t)]
-        if matter and max(np.sum(t.blocks) for t in good) - max(np.sum(t.blocks) for t in matter) <= MIN_GAIN:
-            good = matter
+        if matter:
+            large = max(matter, key=_score)
+            if not any(_score(t) > _score(large) + MIN_GAIN or _is_imitated(t, large, scores) for t in good):
+                good = matter
         return tuple(like_the_file(sorted(good, key=lambda t: -float(np.sum(t.blocks))), scores))
 
 
@@ -242,7 +245,7 @@ def simplest(trials: Sequence[Trial], base: Array, terms: Sequence[Term]) -> Tri
     them (`_simplicity`). A new name has to gain as much more than another law of a name already accepted as a form has."""
     named, most = {name_of(t) for t in terms}, trials[0]
     alike = [t for t in trials if np.sum(most.blocks - t.blocks) <= margin(t, base, _simplicity(t, most))]
-    first = min(alike, key=lambda t: (len(t.term.free), -np.sum(t.blocks)))
+    first = min(alike, key=lambda t: (_values(t, most) - _values(most, t), -np.sum(t.blocks)))
     best = next((t for t in trials if name_of(t) in named and np.sum(most.blocks - t.blocks) <= margin(most, base)), first)
     same = [t for t in trials if of_curve(t) == of_curve(best)]
     found, *more = sorted(same, key=lambda t: (len(t.term.free), -t.gain))
@@ -266,8 +269,29 @@ def like_the_file(trials: Sequence[Trial], base: Array) -> list[Trial]:
 def _simplicity(t: Trial, other: Trial) -> float:
     """Share of MIN_FORM by which a form may gain less than another of more values: MIN_FORM where it has half of them, all where it has
     less. A mass on a spring and a damper may stand for many a law with one value, a spring and a damper for a delay."""
-    few, many = len(t.term.free), len(other.term.free)
+    few, many = _values(t, other), _values(other, t)
     return float(2 * few < many) or MIN_FORM * (2 * few <= many)
+
+
+def _is_imitated(t: Trial, large: Trial, base: Array) -> bool:
+    """Does a form gain about as much as a large one that takes more than twice its values?"""
+    share = _simplicity(t, large)
+    return share == 1.0 and _score(large) - _score(t) <= margin(t, base, share)
+
+
+def _score(t: Trial) -> float:
+    return float(np.sum(t.blocks))
+
+
+def _values(t: Trial, other: Trial) -> int:
+    """Values that a form takes: its own, and those of the file that it moves out of their tolerances and another form leaves there."""
+    return len(t.term.free) + len(moved(t.fit) - moved(other.fit))
+
+
+def moved(fit: Fit) -> set[Target]:
+    """Values of the file that are surely out of their tolerances."""
+    stated = [f for f in fit.free if isinstance(f, Stated)]
+    return {f.target for f in stated if abs(f.value - f.origin) > f.sigma / SHARE + Z_95 * fit.deviation(f.target)}
 
 
 def margin(t: Trial, base: Array, share: float = 1.0) -> float:
