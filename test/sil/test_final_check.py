@@ -258,10 +258,13 @@ def test_a_high_pass_of_a_sensor_is_no_agreement(tmp_path):
     assert found.verdict == "unexplained"
 
 
-@pytest.mark.parametrize("stiffness, law, within", [(1.019, "", True), (1.021, "", False), (1.019, "quadratic_damper", False)])
-def test_values_within_tolerances_are_what_the_file_allows(tmp_path, stiffness, law, within):
-    """Of a stiffness known to 2 %; a law beside it is more than that."""
-    (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS))
+@pytest.mark.parametrize(
+    "tolerance, stiffness, law, within",
+    [(0.02, 1.019, "", True), (0.02, 1.021, "", False), (0.02, 1.019, "quadratic_damper", False), (0.0, 1.001, "", False)],
+)
+def test_values_within_tolerances_are_what_the_file_allows(tmp_path, tolerance, stiffness, law, within):
+    """Of a stiffness known to 2 %; a law beside it is more than that. Without a stated tolerance no other value is."""
+    (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, tolerance, SENSORS))
     nominal = penode_gen.load(tmp_path / "rig.toml")
     case = Case(nominal, nominal, (), (), (), (), tmp_path, lambda text: None, lambda share, doing: None)
     k = nominal.parameters["k"]

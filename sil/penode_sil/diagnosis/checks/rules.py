@@ -19,7 +19,6 @@ from ...predicted import Predicted
 from .. import catalogue
 from ..catalogue import drives, values as of_values
 from ..catalogue.friction import turns
-from ..evidence.bench import with_tolerances
 from ..reliability import trusted
 from ..report.figure import number
 from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, UNKNOWN, Cause, place
@@ -135,8 +134,8 @@ def mended(case: Case, end: End, table: Table) -> list[str]:
 
 
 def allowed(case: Case, end: End) -> bool:
-    """Is the written model the nominal one with other values, all within their tolerances?"""
-    known, written = with_tolerances(case.model).parameters, end.extended.parameters
+    """Is the written model the nominal one with other values, all within the tolerances that its file states?"""
+    known, written = case.model.parameters, end.extended.parameters
     if known.keys() != written.keys() or len(end.extended.elements) != len(case.model.elements):
         return False
     return all(abs(written[n].value - p.value) <= p.tolerance * abs(p.value) for n, p in known.items())
@@ -151,7 +150,7 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
     """Explained: by causes that were withheld, for they are small beside the force there, if they leave noise alone or RATIO times less
     than the nominal model; or else by values of parameters."""
     d = end.answer
-    taken = 1.0 - max((r.rms("extended") / max(r.rms("refitted"), 1e-300)) ** 2 for r in table.rows if r.figure.signal in sensors)
+    taken = min(_beyond_noise(r, table) for r in table.rows if r.figure.signal in sensors)
     whole = not misses(table.rows, "extended", table.noise)
     d = replace(d, verdict="explained" if whole else "partly_explained", explained=max(taken, 0.0))
     clear = all(RATIO * r.rms("extended") < min(map(r.rms, NOMINAL)) for r in _missed(table) if r.figure.signal in sensors)
@@ -169,6 +168,12 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
     note = f"{off}: neither its small causes nor other parameter values explain that"
     unsure = (UNKNOWN,)
     return replace(end, answer=replace(d, verdict="unexplained", causes=unsure, explained=0.0, notes=(*d.notes, note)))
+
+
+def _beyond_noise(r: Row, table: Table) -> float:
+    """Share of the power beyond noise of the refitted nominal model's error that the written one takes away."""
+    left, whole = (max(r.rms(what) ** 2 - table.noise[r.sensor] ** 2, 0.0) for what in ("extended", "refitted"))
+    return 1.0 - left / max(whole, 1e-300)
 
 
 def spread(case: Case, end: End, table: Table) -> list[values.Few]:
