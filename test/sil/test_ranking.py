@@ -115,7 +115,7 @@ def test_a_passed_rival_with_more_values_is_as_likely_as_the_form_that_was_chose
     rival, chosen, worse = trial("maxwell_bushing", 105.0, LATE), trial("input_lag", 100.0, where="u"), trial("backlash", 50.0, LOOSE)
     found = {f.kind: p for f, p in naming._weighed([rival, chosen, worse], chosen)}
     assert found == {"maxwell_bushing": 0.5, "input_lag": 0.5, "backlash": 0.0}
-    assert dict((f.kind, p) for f, p in naming._weighed([rival, chosen], rival)) == {"maxwell_bushing": 1.0, "input_lag": 0.0}
+    assert {f.kind: p for f, p in naming._weighed([rival, chosen], rival)} == {"maxwell_bushing": 1.0, "input_lag": 0.0}
 
 
 def test_a_place_is_the_same_by_either_of_its_names():

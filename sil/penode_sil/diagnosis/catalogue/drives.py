@@ -141,7 +141,7 @@ def common_gain(model: Model, fitted: Mapping[str, Value], limits: Mapping[str, 
     own = {n: v for n, v in fitted.items() if any(u in v.unit for u in ("N", "kg"))}
     nominal = {n: model.parameters[n].value for n in own}
     off = [n for n, v in own.items() if _is_off(v, nominal[n], limits[n])]
-    if len(model.inputs) != 1 or not forces or seen or len(off) < 2 or not {b.mass for b in model.bodies} <= own.keys():
+    if len(model.inputs) != 1 or not forces or seen or len(off) <= 1 or not {b.mass for b in model.bodies} <= own.keys():
         return None
     low, high = (np.array([own[n].ci95[k] / nominal[n] for n in off]) for k in (0, 1))
     weights = 1.0 / np.maximum(high - low, 1e-300) ** 2

@@ -172,7 +172,7 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
 
 def _beyond_noise(r: Row, table: Table) -> float:
     """Share of the power beyond noise of the refitted nominal model's error that the written one takes away."""
-    left, whole = (max(r.rms(what) ** 2 - table.noise[r.sensor] ** 2, 0.0) for what in ("extended", "refitted"))
+    left, whole = (max(r.rms(what) ** 2 - float(table.noise[r.sensor]) ** 2, 0.0) for what in ("extended", "refitted"))
     return 1.0 - left / max(whole, 1e-300)
 
 

@@ -44,7 +44,7 @@ class Offset:
 def named(model: Model, bench: Bench, level: float, shifts: Array) -> tuple[list[Cause], list[str]]:
     """Sensor offsets that the recordings show by MIN_GAIN, as any cause, or the load that explains them. One is a cause if it is surely
     not zero, above the share of the signal's rms that has a name (`worth.least`, beside the unmodelled `level` that remains), below 100 %,
-    and above what may be wrong with the shift [n_z] of the signal's mean by what else was found, for a curve may be off by MIN_FORM. Others,
+    and above what may be wrong with the shift [n_z] of the signal's mean by what else was found: a curve may be off by MIN_FORM. Others,
     and those near 1 g, become notes. Nothing where start states have the same effect: a plant without a spring to ground has no zero, and
     its sensors are off against each other at most."""
     found, notes = [], []

@@ -26,7 +26,6 @@ from .rounds import terms_of
 from .terms import Term
 from .worth import Z_95, least, shift, systematic, undetermined
 
-
 COMMON = "masses, stiffnesses and dampings that are off by a common factor have the same effect; model_extended.toml has that form"
 
 

@@ -15,7 +15,7 @@ from ..catalogue.form import Form
 from ..evidence.observer import bias
 from ..evidence.screening import Probe
 from .propose import as_it_is, is_part, motions
-from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, moved, name_of, of_curve, scored, simplest, terms_of
+from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, are_many, moved, name_of, of_curve, scored, simplest, terms_of
 from .terms import Trial
 from .worth import Z_95, mostly, wrong
 
@@ -55,8 +55,9 @@ def _other_beginnings(grown: Grown, best: Grown) -> list[Accepted]:
 
 
 def _is_better(end: Grown, other: Grown, first: Trial) -> bool:
-    """Does an end gain MIN_GAIN beyond another one, and as much again for each law that it has more, or anything with fewer? One that moves values of the file out
-    of their tolerances, and with these has more than twice as many values, has to gain MIN_FORM of what the first form did."""
+    """Does an end gain MIN_GAIN beyond another one, and as much again for each law that it has more, or anything with fewer? One that moves
+    values of the file out of their tolerances, and with these has more than twice as many values, has to gain MIN_FORM of what the first
+    form did."""
     gain, much = _total(end) - _total(other), max(MIN_GAIN, MIN_FORM * first.gain)
     if _imitates(end, other):
         return gain > much
@@ -70,7 +71,7 @@ def _imitates(end: Grown, other: Grown) -> bool:
     """Does an end take more than twice the values of another one, with those of the file that it moves and the other does not?"""
     laws, own = (sum(len(t.free) for t in terms_of(x.accepted)) for x in (other, end))
     gone, left = (moved(a.bench.fit) - moved(b.bench.fit) for a, b in ((end, other), (other, end)))
-    return bool(gone) and 2 * (laws + len(left)) < own + len(gone)
+    return bool(gone) and are_many(own + len(gone), laws + len(left))
 
 
 def centred(rounds: Rounds, grown: Grown) -> Grown:

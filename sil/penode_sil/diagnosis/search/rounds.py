@@ -270,7 +270,12 @@ def _simplicity(t: Trial, other: Trial) -> float:
     """Share of MIN_FORM by which a form may gain less than another of more values: MIN_FORM where it has half of them, all where it has
     less. A mass on a spring and a damper may stand for many a law with one value, a spring and a damper for a delay."""
     few, many = _values(t, other), _values(other, t)
-    return float(2 * few < many) or MIN_FORM * (2 * few <= many)
+    return float(are_many(many, few)) or MIN_FORM * are_many(many + 1, few)
+
+
+def are_many(values: int, others: int) -> bool:
+    """Are they more than twice as many as others?"""
+    return values > 2 * others
 
 
 def _is_imitated(t: Trial, large: Trial, base: Array) -> bool:
