@@ -63,7 +63,9 @@ class Observer:
 
 @dataclass(frozen=True, eq=False)
 class BatchRun:
-    """What all runs did: states x, outputs y, sensors z [runs, n, .], those asked for in the order asked for.
+    """What all runs did: states x, outputs y, sensors z [runs, n, .], those asked for in the order asked for; and the innovations of
+    the observer, nu [runs, updates, n_z], the means of measured less simulated, of all sensors in their units, by which each update moved
+    the states: NaN where nothing was measured since the one before, and no updates without an observer.
 
     The arrays are views: in memory run follows run, so z.transpose(1, 2, 0) costs nothing, and z.reshape a copy.
     `first_bad` [runs] is the first sample that the step held (NaN, Inf, a singular solve: do not use what follows) or
@@ -73,6 +75,7 @@ class BatchRun:
     x: Array
     y: Array
     z: Array
+    nu: Array
     first_bad: NDArray[np.int64]
     first_outside: NDArray[np.int64]
 
@@ -88,7 +91,8 @@ class _Job(ctypes.Structure):
         ("update", ctypes.c_size_t),
         ("measured_runs", ctypes.c_size_t),
     ]
-    _fields_ += [("measured", ctypes.c_void_p), ("gain", ctypes.c_void_p), ("count", ctypes.c_size_t * 3)]
+    _fields_ += [(name, ctypes.c_void_p) for name in ("measured", "gain", "innovation")]
+    _fields_ += [("count", ctypes.c_size_t * 3)]
     _fields_ += [("which", ctypes.c_void_p * 3), ("kept", ctypes.c_void_p * 3)]
     _fields_ += [(name, ctypes.c_void_p) for name in ("first_bad", "first_outside")]
 
@@ -161,18 +165,19 @@ class Batch:
         job.first_bad, job.first_outside = (a.ctypes.data for a in first)
         job.count = tuple(map(len, wanted))
         job.which, job.kept = (tuple(a.ctypes.data for a in arrays) for arrays in (wanted, kept))
-        kept += self._observed(observer, job, -(-n // every), padded)  # arrays that the job points to
+        kept += self._observed(observer, job, -(-n // every), padded)  # innovations, and what else the job points to
         self._steps += n * runs * model.substeps
         if not self._step(self._library(per_run, self._steps <= SHORT), job, vectors, threads):
             raise WrongUse(f"{model.path}: a set has more straight pieces than there is room for; give more `pieces`")
-        x, y, z = (k[:, :, :runs].transpose(2, 0, 1) for k in kept[:3])
-        return BatchRun(x, y, z, *first[:, :runs].astype(np.int64))
+        x, y, z, nu = (k[:, :, :runs].transpose(2, 0, 1) for k in kept[:4])
+        return BatchRun(x, y, z, nu, *first[:, :runs].astype(np.int64))
 
     def _observed(self, observer: Observer | None, job: _Job, n: int, padded: int) -> tuple[Array, ...]:
-        """Sets the observer of a job that keeps n samples. Raises ValueError for shapes."""
-        if observer is None or not self.model.states or not self.model.sensors:
-            return ()
+        """Sets the observer of a job that keeps n samples: innovations [updates, n_z, padded], and inputs of it. Raises ValueError for
+        shapes."""
         n_x, n_z = len(self.model.states), len(self.model.sensors)
+        if observer is None or not n_z:
+            return (np.empty((0, n_z, padded), dtype=self.dtype),)
         measured: Array = np.asarray(observer.measured, dtype=self.dtype)
         gain: Array = np.asarray(observer.gain, dtype=self.dtype)
         if measured.shape[-2:] != (n, n_z) or gain.shape[-2:] != (n_x, n_z):
@@ -182,8 +187,9 @@ class Batch:
         gain = self._spread(np.moveaxis(gain, 0, -1) if gain.ndim == 3 else gain[:, :, None], padded)
         measured = np.ascontiguousarray(measured)
         job.update, job.measured_runs = observer.update, padded if measured.ndim == 3 else 1
-        job.measured, job.gain = measured.ctypes.data, gain.ctypes.data
-        return measured, gain
+        nu: Array = np.empty((n // observer.update, n_z, padded), dtype=self.dtype)
+        job.measured, job.gain, job.innovation = (a.ctypes.data for a in (measured, gain, nu))
+        return nu, measured, gain
 
     def _runs(self, u: Array, start: Array, given: Mapping[str, Array], values: Array, length: int) -> int:
         """How many runs the arguments describe. Raises for what does not fit."""

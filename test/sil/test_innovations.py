@@ -25,7 +25,7 @@ from penode_sil.diagnosis.checks import leftover
 from penode_sil.diagnosis.evidence import bench, blocks
 from penode_sil.diagnosis.evidence.bench import with_tolerances
 from penode_sil.diagnosis.evidence.gain import Gains, Level, riccati
-from penode_sil.diagnosis.evidence.observer import Record, augmented, sample_noise
+from penode_sil.diagnosis.evidence.observer import MAX_INNOVATION, Filter, Predictor, Record, augmented, sample_noise
 from penode_sil.diagnosis.plant import plant
 from penode_sil.diagnosis.search import holding, naming
 from penode_sil.diagnosis.study import driven
@@ -52,6 +52,19 @@ motor = {{ between = ["arm", "ground"], law = "expression", force = "-tau" }}
 phi = {{ value = "phi", unit = "rad" }}
 [sensors]
 phi = {{ value = "phi", unit = "rad", noise = 1e-4 }}
+"""
+
+
+LEVER = """
+[model]
+name = "lever"
+sample_time = "1 ms"
+[inputs]
+u = { unit = "1" }
+[outputs]
+y = { value = "2*u", unit = "1" }
+[sensors]
+z = { value = "3*u", unit = "1" }
 """
 
 
@@ -157,6 +170,52 @@ def test_observer_moves_states_by_the_mean_innovation(tmp_path):
     nu = np.nanmean(y[4:8] - after.z[0, 1:], axis=0)  # one of these was not measured
     again = batch.run(e.u[7:9], x0=after.x[0, -1] + gain @ nu, states=model.states)
     assert np.max(np.abs(whole.x[0, 8] - again.x[0, 1])) < 1e-14  # rounding of a mean of four, and of one step
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_innovations_are_means_of_measured_less_simulated(tmp_path, dtype):
+    """To the bit, added in the order of the samples; NaN where nothing was measured since the update before. 19 runs: no multiple of any
+    number of lanes. The last 2 of 102 samples have no update."""
+    (tmp_path / "model.toml").write_text(SWING.format(k=0.64, tolerance="") + 'rate = { value = "omega", unit = "rad/s" }\n')
+    model = penode_gen.load(tmp_path / "model.toml")
+    rng, runs, n, update = np.random.default_rng(2), 19, 102, 5
+    u, x0 = 0.01 * rng.standard_normal((n, 1)), 0.1 * rng.standard_normal((runs, 2))
+    y = 0.1 * rng.standard_normal((runs, n, 2)).astype(dtype)
+    y[rng.random(y.shape) < 0.3] = np.nan
+    y[:, 10:15], y[4], y[5, :35] = np.nan, np.nan, np.nan
+    batch, gain = Batch(model, dtype), rng.uniform(0.0, 0.5, (runs, 2, 2))
+    run = batch.run(u, x0=x0, observer=Observer(update, y, gain), states=model.states)
+    total, count = np.zeros((2, runs, n // update, 2), dtype)
+    for k in range(n // update * update):
+        there = np.isfinite(y[:, k])
+        total[:, k // update] += np.where(there, y[:, k] - run.z[:, k], dtype(0.0))
+        count[:, k // update] += there
+    means = np.where(count > 0, total / np.maximum(count, 1), dtype(np.nan))
+    assert run.nu.dtype == dtype and np.array_equal(run.nu, means, equal_nan=True)
+    assert np.isnan(run.nu[4]).all() and np.isnan(run.nu[:, 2]).all() and np.isnan(run.nu[5, :7]).all()
+    assert np.isfinite(run.nu[6, 3:]).any() and (run.first_bad < 0).all()
+    less = batch.run(u, x0=x0, observer=Observer(update, y, gain), sensors=())  # sensors need not be kept for it
+    assert less.z.shape == (runs, n, 0) and np.array_equal(less.nu, run.nu, equal_nan=True)
+    assert batch.run(u, x0=x0).nu.shape == (runs, 0, 2)
+
+
+def test_a_model_without_states_has_innovations_too(tmp_path):
+    (tmp_path / "lever.toml").write_text(LEVER)
+    y = np.arange(8.0)[:, None]
+    nu = Batch(penode_gen.load(tmp_path / "lever.toml")).run(np.ones((8, 1)), observer=Observer(4, y, np.zeros((0, 1)))).nu
+    assert nu.tolist() == [[[1.5 - 3.0], [5.5 - 3.0]]]
+
+
+def test_innovations_of_a_run_that_left_all_bounds_stay_within_theirs(tmp_path):
+    """Of an observer that overshoots more each time; one that stayed is not touched by it."""
+    model, (e,) = swing(tmp_path, lambda s, v: 0.0, seconds=4.0)
+    wide = augmented(model)
+    gains = [Filter(np.array([[g], [0.0], [0.0]]), np.ones(1)) for g in (0.3, 5.0)]
+    predictor = Predictor(wide, [Record("r", e.step, e.drive, np.array(e.y))], 5)
+    both = predictor.predict((), np.zeros((2, 0)), Filter.many(gains))[0]
+    alone = predictor.predict((), np.zeros((1, 0)), gains[0])[0]
+    assert both.sane[0] and np.array_equal(both.nu[0][0], alone.nu[0][0])
+    assert np.max(np.abs(both.nu[0])) == MAX_INNOVATION
 
 
 def test_width_of_a_students_t():

@@ -186,14 +186,13 @@ class Predictor:
         recording, [runs, n, .]; `watched`: how many sensors more to give, per recording [runs, n, watched]. Returns innovations,
         watched sensors, and states per recording [runs, n, n_x]."""
         nus, seen, moved, sane = [], [], [], np.ones(len(shifts), bool)
-        batch = self._batch(free)
+        batch, more_sensors = self._batch(free), [s.name for s in self.model.sensors[self.n_z :][:watched]]
         for e in range(len(self.records)):
             start, parameters, u, y = self._given(e, free, shifts)
             parameters[f"{UNMODELLED}_tau"] = by.tau
             if e in extra:
                 more = joined(straight(extra[e], self.fine), extra[e])
                 u = np.concatenate([np.broadcast_to(u, (len(more), *u.shape[-2:])), more], axis=-1)
-            blank = np.full((*y.shape[:-1], len(self.model.sensors) - self.n_z), np.nan)
             gain = by.gain / self._scales(parameters)
             wide = np.zeros((*gain.shape[:-1], len(self.model.sensors)))
             wide[..., : self.n_z] = gain
@@ -202,16 +201,15 @@ class Predictor:
                 x0=start,
                 parameters=parameters,
                 set_name=self.set_name,
+                sensors=more_sensors,
                 states=states,
                 every=self.fine,
-                observer=Observer(self.update, np.concatenate([y, blank], axis=-1), wide),
+                observer=Observer(self.update, self._measured[e] if y is self.records[e].y else self._padded(y), wide),
             )
-            z = run.z
-            nu, finite = self._beyond(e, y, z[:, :, : self.n_z])
-            nu = self._as_measured(e, nu, free, shifts)
-            sane &= (run.first_bad < 0) & finite
-            nus.append(nu)
-            seen.append(z[:, :, self.n_z : self.n_z + watched])
+            nu = run.nu[:, :, : self.n_z]
+            nus.append(self._as_measured(e, np.clip(nu, -MAX_INNOVATION, MAX_INNOVATION, out=nu), free, shifts))
+            sane &= run.first_bad < 0
+            seen.append(run.z)
             moved.append(run.x)
         return Lanes(nus, sane), seen, moved
 
@@ -250,21 +248,15 @@ class Predictor:
             record.between[self.fine] = finer(u, record.step, self.fine)
         return record.between[self.fine]
 
-    def _beyond(self, e: int, y: Array, z: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Means [runs, updates, n_z] of what was measured, y [n, n_z] or [runs, n, n_z], beyond what was predicted, z [runs, n, n_z]; and
-        which runs [runs] are finite throughout."""
-        if y.ndim == 2:
-            good, count, measured = self._measured[e]
-            sums = self._blocks(z.transpose(1, 2, 0))  # the order in which it lies in memory
-            total = sums.sum(axis=1) if good is None else np.where(good[..., None], sums, 0.0).sum(axis=1)
-            if np.abs(total).max(initial=0.0) < MAX_INNOVATION:  # false for NaN
-                return measured - (total / count[..., None]).transpose(2, 0, 1), np.ones(len(z), bool)
-        beyond = y - np.where(np.abs(z) < MAX_INNOVATION, z, MAX_INNOVATION)
-        whole = self._blocks(np.moveaxis(beyond, 0, -1))
-        there = np.isfinite(whole)
-        counts = np.sum(there, axis=1)
-        means = np.where(counts > 0, np.sum(np.where(there, whole, 0.0), axis=1) / np.maximum(counts, 1), np.nan)
-        return means.transpose(2, 0, 1), np.all(np.isfinite(z), axis=(1, 2))
+    def _padded(self, y: Array) -> Array:
+        """What was measured, [..., n_z], with all sensors of the model, NaN for those that only it has."""
+        more = len(self.model.sensors) - self.n_z
+        return np.concatenate([y, np.full((*y.shape[:-1], more), np.nan)], axis=-1) if more else y
+
+    @cached_property
+    def _measured(self) -> list[Array]:
+        """The sensors of each recording, as most runs have them."""
+        return [self._padded(r.y) for r in self.records]
 
     def _as_measured(self, e: int, nu: Array, free: Sequence[Free], shifts: Array) -> Array:
         """Innovations [runs, updates, n_z] in units in which densities are those of what was measured: without a lag, a sensor of
@@ -274,22 +266,6 @@ class Predictor:
                 case "lag", j:
                     nu[:, :, j] /= latency.amplified(self.records[e].y[:, j], f.at(shift) / self.records[e].step, self.update)[:, None]
         return nu
-
-    def _blocks(self, x: Array) -> Array:
-        """The samples [n, ...] between updates [updates, update, ...]."""
-        return x[: len(x) // self.update * self.update].reshape(-1, self.update, *x.shape[1:])
-
-    @cached_property
-    def _measured(self) -> list[tuple[NDArray[np.bool_] | None, Array, Array]]:
-        """Of each recording: which samples [updates, update, n_z] were measured (None: all), how many [updates, n_z], and their means."""
-        found = []
-        for r in self.records:
-            y = self._blocks(r.y)
-            good = np.isfinite(y)
-            count = np.sum(good, axis=1)
-            means = np.where(count > 0, np.sum(np.where(good, y, 0.0), axis=1) / np.maximum(count, 1), np.nan)
-            found.append((None if good.all() else good, np.maximum(count, 1).astype(float), means))
-        return found
 
     def _given(self, e: int, free: Sequence[Free], shifts: Array) -> tuple[Array, dict[str, Array], Array, Array]:
         record, runs = self.records[e], len(shifts)
