@@ -231,18 +231,17 @@ class Batch:
 
     def _parameters(self, given: Mapping[str, Array], values: Array, padded: int) -> Array:
         """[n_p, padded]: value or reciprocal of each parameter the code takes; reciprocals of doubles, as in the C."""
-        tunable = [p.name for p in self.model.tunable]
-        found: Array = np.empty((len(self._code.parameters), padded), dtype=self.dtype)
-        for row, (name, inverse) in zip(found, self._code.parameters, strict=True):
-            if name in given:
-                value = given[name]
-            elif name in tunable:
-                value = np.atleast_1d(values[..., tunable.index(name)])
-            else:
-                value = np.array([self.model.parameters[name].value])
-            with np.errstate(divide="ignore", over="ignore"):
-                row[:] = self._spread((1.0 / value if inverse else value).astype(self.dtype), padded)
-        return found
+        taken = self._code.parameters
+        own = {p.name: np.atleast_1d(values[..., i]) for i, p in enumerate(self.model.tunable)} | dict(given)
+        found: Array = np.empty((len(taken), padded))
+        found.T[:] = [self.model.parameters[name].value for name, _ in taken]
+        for row, (name, _) in zip(found, taken, strict=True):
+            if name in own:
+                row[: len(own[name])], row[len(own[name]) :] = own[name], own[name][-1]
+        inverse = [i for i, (_, inverse) in enumerate(taken) if inverse]
+        with np.errstate(divide="ignore", over="ignore"):
+            found[inverse] = 1.0 / found[inverse]
+            return found.astype(self.dtype, copy=False)
 
     def _columns(self, kind: str, wanted: Sequence[str] | None, known: Sequence[str]) -> Array:
         for name in wanted or ():
