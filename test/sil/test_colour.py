@@ -66,6 +66,20 @@ def test_an_update_without_a_measurement_stays_one() -> None:
     assert np.array_equal(np.delete(colour.white(holed), 7, 0), np.delete(colour.white(zero), 7, 0))
 
 
+def test_each_run_and_sensor_is_whitened_for_itself() -> None:
+    """Against the sum over taps, update by update: eight products of at most 4 rounded to 1.1e-16 each, and their sum as often. Runs beside
+    one change no bit of it: slopes along what has no effect are 0."""
+    rng = np.random.default_rng(5)
+    nu, colour = np.clip(rng.normal(size=(3, 40, 2)), -4.0, 4.0), Colour(rng.uniform(-1.0, 1.0, (BEFORE, 2)), np.ones(2))
+    nu[1, 7, 0] = np.nan
+    white, known = colour.white(nu), np.nan_to_num(nu)
+    for k in range(40):
+        before = sum(colour.taps[i - 1] * known[:, k - i] for i in range(1, min(k, BEFORE) + 1))
+        assert np.nanmax(np.abs(white[:, k] - (nu[:, k] - before))) < 16 * 4 * 9 * 1.1e-16
+    assert np.isnan(white[1, 7, 0]) and np.sum(np.isnan(white)) == 1
+    assert all(np.array_equal(colour.white(own), both, equal_nan=True) for own, both in zip(nu, white, strict=True))
+
+
 @pytest.mark.parametrize("late", (0.25, 0.5, 1.5))
 def test_half_a_sample_of_delay_removes_no_noise(late: float) -> None:
     """Straight lines between samples would leave 7/8 of the power of means of four at half a sample, which likelihood takes for a delay."""

@@ -44,9 +44,15 @@ class Colour:
         """Innovations [..., updates, n_z] of one recording, NaN where nothing was measured, without what is predicted of their noise."""
         if not len(self.taps):
             return nu
-        known, found = np.where(np.isfinite(nu), nu, 0.0), np.array(nu)
-        for k, tap in enumerate(self.taps, 1):
-            found[..., k:, :] -= tap * known[..., :-k, :]
+        before, found = len(self.taps), np.empty_like(nu)
+        rows = np.zeros((*nu.shape[:-2], before + nu.shape[-2]))  # zeros before each run: all sums are as long, and equal runs stay equal
+        for j, taps in enumerate(self.taps.T):
+            rows[..., before:] = nu[..., j]
+            lost = ~np.isfinite(rows)
+            np.copyto(rows, 0.0, where=lost)
+            white = np.convolve(rows.ravel(), [1.0, *-taps])[: rows.size].reshape(rows.shape)
+            np.copyto(white, np.nan, where=lost)
+            found[..., j] = white[..., before:]
         return found
 
 
