@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,7 @@ class Fit:
     def values(self) -> dict[str, float]:
         return {f.target: f.value for f in self.free if isinstance(f.target, str)}
 
+    @cached_property
     def curvature(self) -> Array:
         """Of the negative log posterior, in units of the free values."""
         rows = (self.slopes / np.sqrt(self.variance)[None, :, None])[self.used]
@@ -48,7 +50,7 @@ class Fit:
 
     def covariance(self, known: Collection[Target] = ()) -> Array:
         """Of the free values, in their units (log: relative), where some targets are `known`."""
-        c = self.curvature()
+        c = np.array(self.curvature)
         at = [f.target in known for f in self.free]
         c[at, :] = c[:, at] = 0.0
         size = 1.0 / np.sqrt(np.maximum(np.diag(c), 1e-300))
@@ -79,7 +81,7 @@ class Fit:
         likelihood, priors, and the width of the posterior against theirs."""
         prior = np.array([(1.0 if f.log else f.unit) / f.sigma for f in self.free])
         own = prior > 0.0  # what has no prior is free in all fits
-        return self.likelihood - sum(map(cost, self.free)) + float(np.sum(np.log(prior[own]))) - 0.5 * _log_determinant(self.curvature())
+        return self.likelihood - sum(map(cost, self.free)) + float(np.sum(np.log(prior[own]))) - 0.5 * _log_determinant(self.curvature)
 
 
 def _log_determinant(c: Array) -> float:
@@ -119,7 +121,8 @@ class Problem:
 
     def whole(self, nu: Sequence[Array]) -> Array:
         """Innovations [..., updates, n_z] of recordings, whitened, in turn."""
-        return np.concatenate([self.colour.white(x) for x in nu], axis=-2)
+        white = [self.colour.white(x) for x in nu]
+        return np.concatenate(white, axis=-2) if len(white) > 1 else white[0]
 
     def at(self, free: Sequence[Free], by: Filter) -> Fit:
         """The fit that ends at these free values."""
@@ -128,12 +131,13 @@ class Problem:
             if f.at(np.array(MOVE)) == f.value:
                 shifts[i + 1, i] = -MOVE
         nu = self.nu(free, shifts, by)
-        used = np.isfinite(nu[0])
-        moves = np.array([shifts[i + 1, i] for i in range(len(free))])
-        slopes = np.moveaxis((nu[1:] - nu[0]) / moves[:, None, None], 0, -1)
-        slopes[~np.isfinite(slopes)] = 0.0
-        variance, value = likelihood(nu[0], used, self.floor)
-        return Fit(tuple(free), by, nu[0], slopes, used, variance, value, value - sum(map(cost, free)))
+        here, slopes = np.array(nu[0], order="C"), nu[1:] - nu[0]
+        slopes /= np.diag(shifts[1:])[:, None, None]
+        good, used = np.isfinite(slopes), np.isfinite(here)
+        if not good.all():
+            slopes[~good] = 0.0
+        variance, value = likelihood(here, used, self.floor)
+        return Fit(tuple(free), by, here, np.moveaxis(slopes, 0, -1), used, variance, value, value - sum(map(cost, free)))
 
     def solve(self, free: Sequence[Free], by: Filter, iterations: int = 10, close: float = 0.05) -> Fit:
         """The likeliest free values from those given on; ends where a step gains less than `close` in the log posterior."""
@@ -190,7 +194,8 @@ class Problem:
         curvature[stuck], curvature[:, stuck] = 0.0, 0.0
         size = np.sqrt(np.maximum(np.diag(curvature), 1e-30))
         normed = curvature / np.outer(size, size)
-        found = np.array([np.linalg.solve(normed + (1e-10 + d) * np.eye(len(size)), slope / size) / size for d in DAMPING])
+        damped = normed + (1e-10 + DAMPING)[:, None, None] * np.eye(len(size))
+        found = np.linalg.solve(damped, (slope / size)[:, None])[..., 0] / size
         return np.where([f.log for f in fit.free], np.clip(found, -1.0, 1.0), found)
 
 

@@ -42,7 +42,7 @@ class Probe:
     def columns(self, forces: Sequence[tuple[int, Sequence[Array]]], size: float) -> Array:
         """Changes [forces, updates, n_z] of the innovations for a force of 1; each is a place and its series [n] per recording; `size` is
         a small force."""
-        bench, free = self.bench, self.bench.fit.free
+        bench, free, problem = self.bench, self.bench.fit.free, self.bench.problem()
         found = []
         for first in range(0, len(forces), AT_ONCE):
             some = forces[first : first + AT_ONCE]
@@ -53,7 +53,7 @@ class Probe:
                     u[k + 1, :, place] = sizes[k] * series[e]
                 extra[e] = u
             lanes = self.predictor.predict(free, np.zeros((len(some) + 1, len(free))), self.by, extra)[0]
-            nu = bench.problem().whole(lanes.nu)
+            nu = problem.whole(lanes.nu)
             found.append((nu[1:] - nu[0]) / np.array(sizes)[:, None, None])
         return np.concatenate(found) if found else np.zeros((0, *bench.fit.nu.shape))
 

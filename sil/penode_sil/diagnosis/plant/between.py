@@ -67,7 +67,9 @@ def _means(u: Array) -> Array:
 def straight(u: Array, count: int) -> Array:
     """The same shape on straight lines, for signals with edges."""
     share = np.arange(count)[:, None] / count
-    return u[..., :-1, None, :] + share * np.diff(u, axis=-2)[..., None, :]
+    found: Array = share * np.diff(u, axis=-2)[..., None, :]
+    found += u[..., :-1, None, :]
+    return found
 
 
 def joined(split: Array, u: Array) -> Array:

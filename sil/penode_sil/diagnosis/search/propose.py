@@ -156,7 +156,8 @@ def _bent(bench: Bench, index: int, terms: Sequence[Term]) -> list[tuple[Score, 
     for row, f in zip(shifts[1:], forms, strict=True):
         at = len(bench.fit.free) + kinds.index(f.kind)
         row[at] = f.limit / free[at].unit
-    nu = np.concatenate([bench.problem().nu(free, rows, bench.fit.by) for rows in np.array_split(shifts, -(-len(shifts) // AT_ONCE))])
+    problem, parts = bench.problem(), np.array_split(shifts, -(-len(shifts) // AT_ONCE))
+    nu = np.concatenate([problem.nu(free, rows, bench.fit.by) for rows in parts])
     scored = list(zip(as_they_are(bench.fit, nu[1:] - nu[0]), forms, strict=True))
     best = [max((p for p in scored if p[1].kind == k), key=lambda p: p[0].gain) for k in kinds]
     gains = [_moved_gain(bench, f) if s.gain > PROMISE or not ACTUATORS[f.how].small else 0.0 for s, f in best]
