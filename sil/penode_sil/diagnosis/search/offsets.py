@@ -24,9 +24,9 @@ from ..evidence.screening import Probe
 from ..plant.plant import Place
 from ..result import Cause, Named, Value
 from .propose import SMALL
-from .rounds import MIN_FORM, MIN_GAIN
+from .rounds import MIN_GAIN
 from .terms import Term
-from .worth import WORTH, Z_95, confounded, least, own_of_sensors, systematic
+from .worth import WORTH, Z_95, confounded, least, mostly, own_of_sensors, systematic
 
 Array = NDArray[np.float64]
 STARTS = 0.5  # values that other start states count for, where an explanation needs them
@@ -44,9 +44,9 @@ class Offset:
 def named(model: Model, bench: Bench, level: float, shifts: Array) -> tuple[list[Cause], list[str]]:
     """Sensor offsets that the recordings show by MIN_GAIN, as any cause, or the load that explains them. One is a cause if it is surely
     not zero, above the share of the signal's rms that has a name (`worth.least`, beside the unmodelled `level` that remains), below 100 %,
-    and above what may be wrong with the shift [n_z] of the signal's mean by what else was found: a curve may be off by MIN_FORM. Others,
-    and those near 1 g, become notes. Nothing where start states have the same effect: a plant without a spring to ground has no zero, and
-    its sensors are off against each other at most."""
+    and above half of the shift [n_z] of the signal's mean by what else was found: a damper rounded at zero, not sharp, shifts it by 0.4 of
+    that. Others, and those near 1 g, become notes. Nothing where start states have the same effect: a plant without a spring to ground
+    has no zero, and its sensors are off against each other at most."""
     found, notes = [], []
     biases = [bias(s.name) for s in model.sensors]
     shares, mixed = own_of_sensors(bench.model, bench.fit, biases), confounded(bench.model, bench.fit, biases)
@@ -61,7 +61,7 @@ def named(model: Model, bench: Bench, level: float, shifts: Array) -> tuple[list
         # collinearity with other free values amplifies the effect of model error
         sd, size = float(np.hypot(sd, systematic(level) * shown / alone)), abs(value)
         large = max(least(level, 0.0) * shown, Z_95 * sd) < size < shown and abs(size / constants.g - 1.0) > WORTH
-        if bench.places and size > MIN_FORM * shift and large:  # without places it may stand for any law
+        if bench.places and mostly(size / max(shift, 1e-300)) and large:  # without places it may stand for any law
             found.append(Offset(s.name, value, sd))
         else:
             notes.append(f"{s.name} has an offset of {value:.4g} {units.si(s.unit)}: gravity, ride height, a zero that is off?")
