@@ -45,6 +45,14 @@ def test_one_factor_is_the_gain_of_the_input():
     assert {a.where for a in gain.alternatives} == {"m", "c", "d"}
 
 
+def test_without_tolerances_one_factor_is_a_gain_too():
+    """Of values uncertain by 5 %."""
+    model = plant(tolerance=0.0)
+    gain = gain_of(model, 0.05, m=1.17, c=1.18)
+    assert gain is not None and (gain.kind, gain.where) == ("input_gain", "push")
+    assert gain_of(model, 0.05, m=1.17, c=1.40) is None
+
+
 @pytest.mark.parametrize(
     "model, factors",
     [
@@ -52,6 +60,7 @@ def test_one_factor_is_the_gain_of_the_input():
         (plant(), {"m": 1.37, "c": 1.37, "d": 1.0}),  # one is as the file has it
         (plant(), {"m": 1.37, "c": 1.0, "d": 1.0}),  # one is off
         (plant(), {"c": 1.37, "d": 1.37}),  # the mass is exact, or not known at all
+        (plant(), {"m": 1.0, "c": 1.37, "d": 1.37}),  # it is as the file has it: forces are known
         (plant(), {"m": 1.02, "c": 1.03, "d": 1.01}),  # within tolerance
         (plant("m"), {"m": 1.37, "c": 1.37}),  # a road has no gain of forces
         (plant(inputs=2), {"m": 1.37, "c": 1.37}),

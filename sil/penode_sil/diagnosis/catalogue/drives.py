@@ -140,19 +140,13 @@ def common_gain(model: Model, fitted: Mapping[str, Value], limits: Mapping[str, 
     seen = [s.name for s in model.sensors if units.si(s.unit) in FORCES]
     own = {n: v for n, v in fitted.items() if any(u in v.unit for u in ("N", "kg"))}
     nominal = {n: model.parameters[n].value for n in own}
-    off = [n for n, v in own.items() if _is_off(v, nominal[n], limits[n])]
+    off = [n for n, v in own.items() if of_values.is_off(*v.ci95, nominal[n], limits[n])]
     if len(model.inputs) != 1 or not forces or seen or len(off) <= 1 or not {b.mass for b in model.bodies} <= own.keys():
         return None
     low, high = (np.array([own[n].ci95[k] / nominal[n] for n in off]) for k in (0, 1))
     weights = 1.0 / np.maximum(high - low, 1e-300) ** 2
     factor = float(np.sum(weights * 0.5 * (low + high)) / np.sum(weights))
-    if factor <= 0.0 or any(_is_off(v, factor * nominal[n], limits[n]) for n, v in own.items()):
+    if factor <= 0.0 or any(of_values.is_off(*v.ci95, factor * nominal[n], limits[n]) for n, v in own.items()):
         return None
     gain = Value(1.0 / factor, "1", (1.0 / float(np.max(high)), 1.0 / float(np.min(low))))  # what a model leaves out moves each another way
     return Cause("input_gain", forces[0].name, {"gain": gain}, 1.0, tuple(of_values.named(n) for n in off[:3]))
-
-
-def _is_off(value: Value, nominal: float, limit: float) -> bool:
-    """Is an interval farther from a nominal value than this share of it?"""
-    far = limit * abs(nominal)
-    return not value.ci95[0] - far <= nominal <= value.ci95[1] + far

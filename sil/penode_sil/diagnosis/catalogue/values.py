@@ -24,3 +24,9 @@ def cause(parameter: str, value: Value, confidence: float, others: Sequence[str]
 def is_one(found: Cause) -> bool:
     """Is a cause another value of a parameter?"""
     return found.kind == KIND
+
+
+def is_off(low: float, high: float, nominal: float, limit: float) -> bool:
+    """Is a value known to lie from `low` to `high` farther from its nominal value than a relative `limit`?"""
+    far = limit * abs(nominal)
+    return not low - far <= nominal <= high + far

@@ -18,7 +18,7 @@ from ..catalogue import drives, values as of_values
 from ..catalogue.form import Motion
 from ..evidence.bench import UNSTATED
 from ..evidence.fit import Fit
-from ..result import Cause, Value
+from ..result import EXTENDED, Cause, Value
 from ..study.study import guessed
 from . import straight
 from .innovate import Found
@@ -26,7 +26,7 @@ from .rounds import terms_of
 from .terms import Term
 from .worth import Z_95, least, shift, systematic, undetermined
 
-COMMON = "masses, stiffnesses and dampings that are off by a common factor have the same effect; model_extended.toml has that form"
+COMMON = f"masses, stiffnesses and dampings that are off by a common factor have the same effect; {EXTENDED} has that form"
 
 
 @dataclass(frozen=True)
@@ -44,15 +44,17 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
     forms that were found. Causes have this `confidence`. All by one factor, they are the gain of an input that the file lacks."""
     plain, whole = found.plain.fit, found.bench.fit.values
     shared = straight.beside(model, found.plain, _straight(terms_of(found.named)), moved)
-    if gain := _common_gain(model, found, moved, shared):
+    judged = [p for p in model.parameters.values() if p.name in whole and not np.isinf(p.tolerance)]
+    known = {p.name: _known(model, found, moved, p) for p in judged}
+    sizes = {p.name: _size(p, plain.value(p.name), known[p.name][1], shared) for p in judged}
+    gain = drives.common_gain(model, sizes, {p.name: _limit(p) for p in judged})
+    if gain and abs(gain.parameters["gain"].value - 1.0) >= least(found.possible, 0.0):
         return Judged((replace(gain, confidence=confidence),), (COMMON,), ())
     shared_by_all = straight.beside(model, found.bench, _straight(found.terms), moved)
     causes, notes, absorbed = [], [], []
-    for p in model.parameters.values():
-        if p.name not in whole or np.isinf(p.tolerance):
-            continue
+    for p in judged:
         value, beside, unit = plain.value(p.name), whole[p.name], units.si(p.unit)
-        size, sd = _known(model, found, moved, p)
+        size, sd = known[p.name]
         log(f"{p.name}: {value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of the force there")
         if abs(value - p.value) <= _limit(p) * abs(p.value) + Z_95 * sd:
             continue
@@ -66,10 +68,10 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
             absorbed.append(p.name)
             notes.append(
                 f"{p.name} is {value:.4g} {unit} without the small deviations that were found, "
-                f"and {beside:.4g} with them: within its tolerance"
+                f"and {beside:.4g} with them: within its tolerance, with the slopes of laws at its place"
             )
         else:
-            causes.append(of_values.cause(p.name, _size(p, value, sd, shared), confidence))
+            causes.append(of_values.cause(p.name, sizes[p.name], confidence))
     return Judged(tuple(causes), tuple(notes), tuple(absorbed))
 
 
@@ -77,15 +79,6 @@ def _known(model: Model, found: Found, moved: Sequence[Motion], p: Parameter) ->
     """The share of the force there that changes with a parameter as fitted beside the named forms, and the deviation of its value."""
     fit, size, bent = found.plain.fit, shift(model, found.plain, moved, p.name), systematic(found.possible)
     return size, float(np.hypot(fit.deviation(p.name), bent / max(size, bent, 1e-300) * abs(fit.value(p.name) - p.value)))
-
-
-def _common_gain(model: Model, found: Found, moved: Sequence[Motion], shared: Mapping[str, straight.Slopes]) -> Cause | None:
-    """The gain of an input that does what parameters do together, see there; none where that is no more than unmodelled effects can do."""
-    fit = found.plain.fit
-    free = [p for p in model.parameters.values() if p.name in fit.values and np.isfinite(p.tolerance)]
-    values = {p.name: _size(p, fit.value(p.name), _known(model, found, moved, p)[1], shared) for p in free}
-    gain = drives.common_gain(model, values, {p.name: _limit(p) for p in free})
-    return gain if gain and abs(gain.parameters["gain"].value - 1.0) >= least(found.possible, 0.0) else None
 
 
 def _straight(terms: Sequence[Term]) -> list[Term]:

@@ -15,7 +15,7 @@ from ..catalogue.form import Form
 from ..evidence.observer import bias
 from ..evidence.screening import Probe
 from .propose import as_it_is, is_part, motions
-from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, are_many, moved, name_of, of_curve, scored, simplest, terms_of
+from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, beyond_twice, moved, name_of, of_curve, score, scored, simplest, terms_of
 from .terms import Trial
 from .worth import Z_95, mostly, wrong
 
@@ -32,7 +32,7 @@ def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
     for k, a in enumerate(best.accepted):
         single = [t for t in a.trials if len(t.form.kinds) == 1]
         if len(a.trial.form.kinds) > 1 and single:
-            first = Accepted(max(single, key=_score), a.number, (), a.trials)
+            first = Accepted(max(single, key=score), a.number, (), a.trials)
             other = _exchanged(rounds, rounds.grow([*best.accepted[:k], first]))
             names, gain = [name_of(x.trial) for x in other.accepted], _total(other) - _total(best)
             rounds.log(f"replacing the two-law form {name_of(a.trial)} by {names}: {gain:.0f} nats")
@@ -47,9 +47,9 @@ def _other_beginnings(grown: Grown, best: Grown) -> list[Accepted]:
     found: dict[object, Accepted] = {}
     there = {of_curve(a.trial) for a in best.accepted}
     for first in grown.accepted[:1]:
-        enough = _score(first.trial) - max(MIN_GAIN, MIN_FORM * first.trial.gain)
+        enough = score(first.trial) - max(MIN_GAIN, MIN_FORM * first.trial.gain)
         for t in first.trials:
-            if of_curve(t) not in there and not is_part(first.trial.form, t.form) and _score(t) >= enough:
+            if of_curve(t) not in there and not is_part(first.trial.form, t.form) and score(t) >= enough:
                 found.setdefault(of_curve(t), Accepted(t, first.number, (), first.trials))
     return list(found.values())
 
@@ -71,7 +71,7 @@ def _imitates(end: Grown, other: Grown) -> bool:
     """Does an end take more than twice the values of another one, with those of the file that it moves and the other does not?"""
     laws, own = (sum(len(t.free) for t in terms_of(x.accepted)) for x in (other, end))
     gone, left = (moved(a.bench.fit) - moved(b.bench.fit) for a, b in ((end, other), (other, end)))
-    return bool(gone) and are_many(own + len(gone), laws + len(left))
+    return bool(gone) and beyond_twice(own + len(gone), laws + len(left)) > 0
 
 
 def centred(rounds: Rounds, grown: Grown) -> Grown:
@@ -92,8 +92,8 @@ def centred(rounds: Rounds, grown: Grown) -> Grown:
         plain = replace(bench, fit=bench.problem().at([f for f in bench.fit.free if f.target not in none], bench.fit.by))
         t = as_it_is(plain, bench.fit, form, motions(Probe.of(bench)), terms_of(within))
         t = scored(plain, rounds.blocks, t)
-        rounds.log(f"{form.kind} at {form.where} {form.note}: {_score(t) - _total(grown):.1f} nats more, without offsets")
-        if _score(t) >= _total(grown) - MIN_GAIN:
+        rounds.log(f"{form.kind} at {form.where} {form.note}: {score(t) - _total(grown):.1f} nats more, without offsets")
+        if score(t) >= _total(grown) - MIN_GAIN:
             free = (*t.fit.free, *(replace(f, value=f.origin) for f in biases))
             other = Accepted(replace(t, fit=replace(t.fit, free=free)), a.number, (), (t, *a.trials))
             end = rounds.grow([*grown.accepted[:k], other, *grown.accepted[k + 1 :]])
@@ -150,12 +150,12 @@ def _exchanged(rounds: Rounds, grown: Grown) -> Grown:
             found, whole, loss = others, float(np.sum(scores)), loss + MIN_GAIN
             continue
         good = rounds.good(bench, scores, within)
-        own = max((_score(t) for t in good if name_of(t) == name_of(a.trial)), default=whole)
+        own = max((score(t) for t in good if name_of(t) == name_of(a.trial)), default=whole)
         best = simplest(good, scores, terms_of(within)) if good else a.trial
         share = wrong(bench.level.size) if is_part(best.form, a.trial.form) else 1.0
         less = max(MIN_GAIN, share * MIN_FORM * (own - float(np.sum(scores))))
-        simpler = len(best.term.free) < len(a.trial.term.free) and _score(best) >= own - less
-        if name_of(best) != name_of(a.trial) and (simpler or _score(best) - own > MIN_GAIN):
+        simpler = len(best.term.free) < len(a.trial.term.free) and score(best) >= own - less
+        if name_of(best) != name_of(a.trial) and (simpler or score(best) - own > MIN_GAIN):
             rounds.log(f"{name_of(best)} for {name_of(a.trial)}")
             number = 1 + max(x.number for x in found)  # a fresh one: fits of other forms still hold parameters named after the old one
             found[found.index(a)] = Accepted(best, number, (), good)
@@ -179,10 +179,6 @@ def _has_other(a: Accepted) -> bool:
     that no other form of that was tried beside what came later?"""
     others = [t for t in a.trials if of_curve(t) == of_curve(a.trial) and name_of(t) != name_of(a.trial)]
     return any(len(t.term.free) < len(a.trial.term.free) for t in others) or catalogue.has_one_curve(a.trial.form.kind)
-
-
-def _score(t: Trial) -> float:
-    return float(np.sum(t.blocks))
 
 
 def _total(grown: Grown) -> float:

@@ -157,10 +157,10 @@ class Rounds:
         good = [t for t in good if not any(_is_enough(part, t) for part in trials)]  # what is left of it without the part is no gain
         matter = [t for t in good if _matters(t)]
         if matter:
-            large = max(matter, key=_score)
-            if not any(_score(t) > _score(large) + MIN_GAIN or _is_imitated(t, large, scores) for t in good):
+            large = max(matter, key=score)
+            if not any(score(t) > score(large) + MIN_GAIN or _is_imitated(t, large, scores) for t in good):
                 good = matter
-        return tuple(like_the_file(sorted(good, key=lambda t: -float(np.sum(t.blocks))), scores))
+        return tuple(like_the_file(sorted(good, key=lambda t: -score(t)), scores))
 
 
 def terms_of(accepted: Sequence[Accepted]) -> list[Term]:
@@ -269,22 +269,22 @@ def like_the_file(trials: Sequence[Trial], base: Array) -> list[Trial]:
 def _simplicity(t: Trial, other: Trial) -> float:
     """Share of MIN_FORM by which a form may gain less than another of more values: MIN_FORM where it has half of them, all where it has
     less. A mass on a spring and a damper may stand for many a law with one value, a spring and a damper for a delay."""
-    few, many = _values(t, other), _values(other, t)
-    return float(are_many(many, few)) or MIN_FORM * are_many(many + 1, few)
+    more = beyond_twice(_values(other, t), _values(t, other))
+    return float(more > 0) or MIN_FORM * (more >= 0)
 
 
-def are_many(values: int, others: int) -> bool:
-    """Are they more than twice as many as others?"""
-    return values > 2 * others
+def beyond_twice(values: int, others: int) -> int:
+    """How many values there are more than twice as many as others; below zero for fewer."""
+    return values - 2 * others
 
 
 def _is_imitated(t: Trial, large: Trial, base: Array) -> bool:
     """Does a form gain about as much as a large one that takes more than twice its values?"""
-    share = _simplicity(t, large)
-    return share == 1.0 and _score(large) - _score(t) <= margin(t, base, share)
+    return beyond_twice(_values(large, t), _values(t, large)) > 0 and score(large) - score(t) <= margin(t, base)
 
 
-def _score(t: Trial) -> float:
+def score(t: Trial) -> float:
+    """Of all held-out blocks."""
     return float(np.sum(t.blocks))
 
 

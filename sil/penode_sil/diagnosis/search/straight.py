@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from penode_gen import laws
 from penode_gen.model import Model
 
+from ..catalogue import values as of_values
 from ..catalogue.form import Motion, Moved
 from ..evidence.bench import Bench
 from ..plant.plant import Place
@@ -29,8 +30,7 @@ Slopes = tuple[float, float]  # the least and the greatest
 
 def off(nominal: float, own: float, slopes: Slopes, limit: float) -> bool:
     """Is a parameter, `own` as it is fitted, farther from its nominal value than its relative `limit`, with any of the slopes beside it?"""
-    far = limit * abs(nominal)
-    return not own + slopes[0] - far <= nominal <= own + slopes[1] + far
+    return of_values.is_off(own + slopes[0], own + slopes[1], nominal, limit)
 
 
 def beside(model: Model, bench: Bench, terms: Sequence[Term], moved: Sequence[Motion]) -> dict[str, Slopes]:
