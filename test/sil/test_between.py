@@ -17,6 +17,7 @@ from test_innovations import swing
 import penode_gen
 from penode_gen.model import Parameter
 from penode_sil.batch import Batch, Observer
+from penode_sil.diagnosis.catalogue import others
 from penode_sil.diagnosis.catalogue.actuators import lagging
 from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence import gain, samples
@@ -124,7 +125,7 @@ def test_a_limit_that_nothing_reaches_is_none(tmp_path):
     """And one that is reached cuts off just that."""
     model, (e,) = swing(tmp_path, lambda s, v: 0.0, seconds=2.0)
     top = float(np.max(np.abs(e.y)))
-    limited, (free,) = clipping.limited(model, Form(clipping.KIND, "phi", "clip", 0, limit=0.5 * top), "most")
+    limited, (free,) = clipping.limited(model, others.limited("phi", 0, 0.5 * top), "most")
     whole, open_, cut = (
         Batch(m).run(e.u, parameters=p).z[0] for m, p in ((model, {}), (limited, {}), (limited, {free.target: free.value}))
     )
@@ -192,7 +193,7 @@ def test_two_sensors_have_a_limit_each(tmp_path):
     both = replace(model, sensors=(*model.sensors, replace(model.sensors[0], name="again")))
     names = []
     for number, index in enumerate((0, 1)):
-        form = Form(clipping.KIND, both.sensors[index].name, "clip", index, limit=0.1 * (index + 1))
+        form = others.limited(both.sensors[index].name, index, 0.1 * (index + 1))
         both, free = clipping.limited(both, form, f"x{90 + number}_0")
         names += [f.target for f in free]
     assert names == ["x90_0_limit", "x91_0_limit"] and [s.expression.count("limit") for s in both.sensors] == [2, 2]

@@ -27,7 +27,7 @@ from penode_sil.diagnosis.evidence.bench import with_tolerances
 from penode_sil.diagnosis.evidence.gain import Gains, Level, riccati
 from penode_sil.diagnosis.evidence.observer import MAX_INNOVATION, Filter, Predictor, Record, augmented, sample_noise
 from penode_sil.diagnosis.plant import plant
-from penode_sil.diagnosis.search import holding, naming
+from penode_sil.diagnosis.search import naming
 from penode_sil.diagnosis.study import driven
 from penode_sil.diagnosis.study.study import begin
 from penode_sil.recordings.measured import load
@@ -251,7 +251,7 @@ def test_forms_are_linear_in_their_gains(tmp_path):
     assert kinds == {k for file in FILES for k in file.KINDS}
     drive = Drive([s], 0.004, 0.04, 1.0)
     channels = [*drives.inputs(model, 1), *drives.bent(model, 0, drive), *drives.sensors(model, 1)]
-    assert {f.kind for f in channels} == set(drives.KINDS) - {holding.KIND}
+    assert {f.kind for f in channels} == set(drives.KINDS) - {"input_hold"}
 
 
 def test_forces_follow_their_shapes(tmp_path):

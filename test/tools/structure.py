@@ -14,6 +14,7 @@ crowded folders    more than 25 files; generated models and files of data (.csv,
 named thresholds   module-level numbers with an UPPER_CASE name in penode_sil: NAME = number, or arithmetic of numbers; the same
                    in a class Rules
 tabled numbers     numbers inside module-level tuples, tables and calls with an UPPER_CASE name in penode_sil: TABLE = (number, ...)
+named causes       names of the diagnosis catalogue (a key of MEANING in diagnosis/catalogue) as strings elsewhere in penode_sil
 compared numbers   numbers other than 0, 1 and -1 inside comparisons in penode_sil: x > 0.3
 settings of training  numbers of the class Settings of penode_sil.training, its one table: a budget
 runtime lines      lines of inc/penode and src together, without the next three; no ratchet but a budget: only more than kept fails
@@ -51,6 +52,7 @@ RATCHETS = (
     "named thresholds",
     "tabled numbers",
     "compared numbers",
+    "named causes",
 )
 BUDGETS = ("settings of training", "runtime lines", "elementary lines", "wire protocol lines", "filter lines", "monitor lines")
 ELEMENTARY = {"pen_elementary.h", "pen_parts.h", "pen_trig.c", "pen_atan.c", "pen_log.c", "pen_root.c"}
@@ -200,6 +202,21 @@ def circular(edges: dict[str, set[str]]) -> list[str]:
     return found
 
 
+def causes(trees: dict[Path, ast.Module], catalogue: Path) -> set[str]:
+    """The kinds of causes that a catalogue has: keys of MEANING in its files."""
+    found: set[str] = set()
+    for path, tree in trees.items():
+        for node in tree.body if path.parent == catalogue else ():
+            if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict) and ast.unparse(node.targets[0]) == "MEANING":
+                found |= {key.value for key in node.value.keys if isinstance(key, ast.Constant)}
+    return found
+
+
+def strings(tree: ast.Module, words: set[str]) -> Iterator[int]:
+    """Lines of strings that are one of some words."""
+    return (node.lineno for node in ast.walk(tree) if isinstance(node, ast.Constant) and node.value in words)
+
+
 def budget(name: str) -> str:
     """Which budget a file of the runtime counts for."""
     if name in ELEMENTARY:
@@ -215,6 +232,8 @@ def look(root: Path) -> tuple[dict[str, int], Found]:
     files = sources(root)
     trees = {path: ast.parse(path.read_text()) for path in files if path.suffix == ".py"}
     runtime = dict.fromkeys(BUDGETS, 0)
+    catalogue = root / "sil" / "penode_sil" / "diagnosis" / "catalogue"
+    kinds = causes(trees, catalogue)
     for path in files:
         name, text = path.relative_to(root).as_posix(), path.read_text()
         lines = text.count("\n")
@@ -228,6 +247,7 @@ def look(root: Path) -> tuple[dict[str, int], Found]:
             found[kind] += [f"{name}:{line}" for line in thresholds(trees[path])]
             found["tabled numbers"] += [f"{name}:{line}" for line in tabled(trees[path])]
             found["compared numbers"] += [f"{name}:{line}" for line in compared(trees[path])]
+            found["named causes"] += [f"{name}:{line}" for line in strings(trees[path], kinds) if path.parent != catalogue]
         if name.startswith(("inc/penode/", "src/")):
             runtime[budget(path.name)] += lines
     for package in ("gen/penode_gen", "sil/penode_sil"):

@@ -45,7 +45,8 @@ def tree(tmp_path: Path) -> Path:
         "gen/penode_gen/__init__.py": "from penode_gen import one\n",
         "gen/penode_gen/one.py": "import penode_gen.two\n",
         "gen/penode_gen/two.py": "",
-        "sil/penode_sil/one.py": "LIMIT = 3.0\nNAME = 'x'\n",
+        "sil/penode_sil/one.py": "LIMIT = 3.0\nNAME = 'play'\n",
+        "sil/penode_sil/diagnosis/catalogue/plays.py": "MEANING = {'play': 'x'}\nKINDS = ('play',)\n",
         "test/tools/structure.json": "{}",
     }.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -64,6 +65,7 @@ def test_counts_of_a_small_tree(tree: Path) -> None:
         "named thresholds": 1,
         "tabled numbers": 0,
         "compared numbers": 0,
+        "named causes": 1,
         "settings of training": 0,
         "runtime lines": 410,
         "elementary lines": 0,
@@ -93,6 +95,7 @@ def test_counts_of_a_small_tree(tree: Path) -> None:
         ("gen/penode_gen/two.py", "import os  # noqa: F401\n", "silenced lines"),
         ("sil/penode_sil/one.py", "SIZES = (3, {'a': 0.5})\n", "tabled numbers"),
         ("sil/penode_sil/one.py", "def f(x):\n    return 0 < x < 0.3 * f(x)\n", "compared numbers"),
+        ("sil/penode_sil/two.py", "def f(kind):\n    return kind == 'play'\n", "named causes"),
         ("sil/penode_sil/training/settings.py", "class Settings:\n    more: float = 0.5\n", "settings of training"),
         ("src/a.c", "\n", "runtime lines"),
         ("src/pen_log.c", "\n", "elementary lines"),

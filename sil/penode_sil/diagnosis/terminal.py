@@ -33,7 +33,7 @@ def _causes(d: Diagnosis) -> list[str]:
     open_to = {id(x.cause): x for x in doubts(d)}
     body = []
     for c in _named(d):
-        body.append(f"  {place(c.kind, c.where)}, confidence {min(c.confidence, 0.99):.0%}")
+        body.append(f"  {place(c.kind, c.where)}, confidence {c.confidence:.0%}")
         body += [f"    {k:<18} {v.value:>11.5g} {v.unit:<10} [{v.ci95[0]:.5g}, {v.ci95[1]:.5g}]" for k, v in c.parameters.items()]
         if id(c) in open_to:
             body.append(f"    or {open_to[id(c)]}: the recordings do not tell which")

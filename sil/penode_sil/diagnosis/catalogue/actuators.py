@@ -64,7 +64,8 @@ class Actuator:
     it; `small`: it is about so where they are small; `size`: name and unit in a report ("": the unit of the input, "/s" behind it), and
     `shown` that for a value; `law` of [actuators] that does the same, empty if there is none, and its `entry` for a value; `order` of
     actuators in series, as in the model file; `by_change`: the value alone does not say how much of the input it changes;
-    `smoothed`: the output at the rows where the input is held between them, if that moves as a line and not in steps."""
+    `smoothed`: the output at the rows where the input is held between them, if that moves as a line and not in steps; `constant`: it adds
+    the same at all times, which has no rate; `late`: by the same time everywhere, which a model file has in samples."""
 
     output: Callable[[Array, Array, float], Array]
     fitted: Callable[[Drive], Value]
@@ -77,6 +78,8 @@ class Actuator:
     by_change: bool = False
     small: bool = True
     smoothed: Callable[[Array, Array, float], Array] | None = None
+    constant: bool = False
+    late: bool = False
 
     def change(self, drive: Drive, value: float) -> float:
         """Rms difference of output and recorded input, relative to the standard deviation of the input."""
@@ -167,7 +170,7 @@ def _gain() -> Actuator:
 
 
 def _offset() -> Actuator:
-    return Actuator(_shifted, lambda d: Value(0.0, 0.01 * d.spread, d.spread), ("offset", ""), order=5)
+    return Actuator(_shifted, lambda d: Value(0.0, 0.01 * d.spread, d.spread), ("offset", ""), order=5, by_change=True, constant=True)
 
 
 def _time(d: Drive) -> Value:
@@ -233,7 +236,7 @@ def _slew_limit() -> Actuator:
 ACTUATORS: dict[str, Actuator] = {
     "input_gain": _gain(),
     "input_offset": _offset(),
-    "input_delay": Actuator(_late, _time, ("delay", "s")),
+    "input_delay": Actuator(_late, _time, ("delay", "s"), late=True),
     "input_drift": _drift(),
     "input_lag": _behind(),
     "input_dead_zone": _dead_zone(),

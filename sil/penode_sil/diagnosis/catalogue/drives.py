@@ -11,6 +11,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from ..result import Cause, Value
+from ..study.fit import Series
 from . import values as of_values
 from .actuators import ACTUATORS, Drive
 from .form import Form, Sizes
@@ -93,6 +94,21 @@ def bent(model: Model, index: int, drive: Drive) -> Iterable[Form]:
     for kind, actuator in ACTUATORS.items():
         for value in actuator.tried(drive) if actuator.tried and (actuator.small or not position) else ():
             yield Form(kind, own, kind, index, limit=value)
+
+
+def hold(model: Model, index: int, added: Series) -> Form:
+    """The form of an input that is held, by what that adds to it."""
+    return Form("input_hold", model.inputs[index].name, "input_added", index, series=added)
+
+
+def is_constant(form: Form) -> bool:
+    """Does it add the same to an input at all times?"""
+    return form.how in ACTUATORS and ACTUATORS[form.how].constant
+
+
+def is_late(form: Form) -> bool:
+    """Does an input come later by a fixed time?"""
+    return form.how in ACTUATORS and ACTUATORS[form.how].late
 
 
 def sensors(model: Model, count: int) -> Iterable[Form]:

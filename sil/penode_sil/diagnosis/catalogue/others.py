@@ -2,9 +2,10 @@
 # Copyright (c) 2026 the penode authors
 """Causes without a law: of parameters, sensors and numerics. Other modules find them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ..result import Cause, Named, Value
+from .form import Form
 
 MEANING = {
     "wrong_parameter": "A parameter of the model file is off by more than its tolerance.",
@@ -29,7 +30,7 @@ UNITS = {  # of these parameters, where it is not that of the signal
     "differs_between_recordings": {"its name": "its own"},
     "sensor_dropout": {"share": "1"},
 }
-_CLIPPING, _DROPOUT = "sensor_clipping", "sensor_dropout"
+_CLIPPING, _DROPOUT, _DIFFERING = "sensor_clipping", "sensor_dropout", "differs_between_recordings"
 
 WHERE = {
     "wrong_parameter": "a parameter",
@@ -53,3 +54,33 @@ def still_at_fault(again: Sequence[Cause], before: Sequence[Cause]) -> list[Caus
 def offset(sensor: str, value: Value, confidence: float, alternatives: Sequence[Named] = ()) -> Cause:
     """An offset of a sensor as a cause, with what has the same effect."""
     return Cause(OFFSET, sensor, {"bias": value}, confidence, tuple(alternatives))
+
+
+def clipped(sensor: str, limits: Mapping[str, Value]) -> Cause:
+    """A sensor with samples at its limits, by what these are called."""
+    return _shown(_CLIPPING, sensor, limits)
+
+
+def limited(sensor: str, index: int, limit: float, note: str = "") -> Form:
+    """The form of a sensor that is cut off beyond a limit, where only its motion shows that."""
+    return Form(_CLIPPING, sensor, "clip", index, note=note, limit=limit)
+
+
+def holed(sensor: str, share: Value) -> Cause:
+    """A sensor that lost a share of its samples."""
+    return _shown(_DROPOUT, sensor, {"share": share})
+
+
+def coarse(model: str, errors: Mapping[str, Value]) -> Cause:
+    """A step that is too long for its model, with its rms errors."""
+    return _shown("integration_error", model, errors)
+
+
+def _shown(kind: str, where: str, parameters: Mapping[str, Value]) -> Cause:
+    """A cause that samples show by themselves, which no other explains."""
+    return Cause(kind, where, dict(parameters), 0.99)
+
+
+def differing(parameter: str, values: Mapping[str, Value], confidence: float, others: Sequence[str] = ()) -> Cause:
+    """A parameter with a value for each recording, with the `others` that may differ as well instead."""
+    return Cause(_DIFFERING, parameter, dict(values), confidence, tuple(Named(_DIFFERING, name) for name in others))

@@ -130,10 +130,10 @@ def _faults(c: _Counts, sensor: str, unit: str) -> list[Cause]:
     if c.clipped >= FEW:
         sizes = {"limit": max(map(abs, c.rails.values())), **c.rails}
         sure = {k: 0.002 * abs(x) + 0.5 * c.quantum for k, x in sizes.items()}
-        found.append(Cause("sensor_clipping", sensor, {k: Value(x, unit, (x - sure[k], x + sure[k])) for k, x in sizes.items()}, 0.99))
+        found.append(others.clipped(sensor, {k: Value(x, unit, (x - sure[k], x + sure[k])) for k, x in sizes.items()}))
     dropped += round(c.lost) if c.proven else 0
     if dropped >= FEW or (dropped and c.far >= FAR[0]):
         share, blur = (dropped + c.more) / c.total, ENDS * c.holes / c.total
         size = Value(share, "1", (max(share - blur, 0.0), share + blur))
-        found.append(Cause("sensor_dropout", sensor, {"share": size}, 0.99))
+        found.append(others.holed(sensor, size))
     return found

@@ -13,10 +13,11 @@ import numpy as np
 from penode_gen import units
 from penode_gen.model import Parameter
 
+from ..catalogue import others
 from ..extend import measuring
 from ..extend.entries import table, toml, unlike
 from ..reliability import trust
-from ..result import Cause, Diagnosis, Named, Value
+from ..result import Cause, Diagnosis, Value
 from ..search.worth import Z_95
 from ..study.fit import Fit, Free, Problem
 from ..study.noise import UNSEEN
@@ -28,8 +29,6 @@ from .case import Case, End
 from .leftover import CHANCE, chi2, rows
 from .values import entry
 from .written import heading, write_extended
-
-KIND = "differs_between_recordings"
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,15 +114,15 @@ def _end(case: Case, study: Study, good: Sequence[Own]) -> End:
     values = {
         s: Value(v, units.si(p.unit), (v - Z_95 * sd, v + Z_95 * sd)) for s, (v, sd) in zip(sets.values(), best.values(), strict=True)
     }
-    others = tuple(Named(KIND, x.name) for x in good[1:] if x.fit.cost - best.fit.cost < CHANCE * CHANCE)
-    extended = write_extended(_text(case, best, sets), case)
+    alike = [x.name for x in good[1:] if x.fit.cost - best.fit.cost < CHANCE * CHANCE]
     seen = replace(study, model=case.model, seen=look(study, study.null))
-    gain, notes, held = measuring.measure(seen, extended, case.unused) if case.unused else ({}, [], [])
     noise = rows(study)
     taken = min((study.null.cost - best.fit.cost) / max(study.null.cost - noise, 1.0), 1.0)
-    cause = Cause(KIND, best.name, values, trust(taken) / (1 + len(others)), others)
+    cause = others.differing(best.name, values, trust(taken) / (1 + len(alike)), alike)
+    extended = write_extended(_text(case, cause, best, sets), case)
+    gain, notes, held = measuring.measure(seen, extended, case.unused) if case.unused else ({}, [], [])
     evidence = (study.null.cost - noise) / float(np.sqrt(2.0 * noise))
-    sure = ({"causes": [{"kind": KIND, "where": best.name}], "posterior": cause.confidence},)
+    sure = ({"causes": [{"kind": cause.kind, "where": best.name}], "posterior": cause.confidence},)
     notes = [*case.remarks, *notes, f"each recording has a parameter set of its own in the extended model: {', '.join(sets.values())}"]
     found = numerics.numerics(seen)[0]
     answer = Diagnosis("explained", (cause,), gain, found, taken, evidence, 0.0, tuple(notes), explanations=sure)
@@ -139,11 +138,11 @@ def _sets(study: Study) -> dict[str, str]:
     return found
 
 
-def _text(case: Case, best: Own, sets: dict[str, str]) -> str:
+def _text(case: Case, cause: Cause, best: Own, sets: dict[str, str]) -> str:
     """The model file with the common fitted parameters, and a set for each recording."""
     model, p = case.model, case.model.parameters[best.name]
     per = units.factor(p.unit)
-    lines = [*heading(model, f"{KIND} at {best.name}"), f"{best.name} = {table(entry(p, p.value) | {'tunable': True})}"]
+    lines = [*heading(model, f"{cause.kind} at {best.name}"), f"{best.name} = {table(entry(p, p.value) | {'tunable': True})}"]
     for f in best.fit.free:
         known = model.parameters.get(f.target) if isinstance(f.target, str) else None
         if known is not None and f.value != known.value:

@@ -11,6 +11,7 @@ import numpy as np
 from penode_gen import units
 
 from ...batch import Batch
+from ..catalogue import others
 from ..plant.plant import anonymous
 from ..plant.stepped import run
 from ..result import Cause, Value
@@ -36,4 +37,4 @@ def numerics(study: Study) -> tuple[dict[str, object], Cause | None]:
         found[s.name] = {"rms_error": error, "unit": units.si(s.unit), "share_of_signal": error / signal if signal else 0.0}
         if error > COARSE * signal and error**2 > float(np.mean(study.levels[0][:, j])):
             parameters[f"rms_error_{s.name}"] = Value(error, units.si(s.unit), (error, error))
-    return found, Cause("integration_error", model.name, parameters, 0.99) if parameters else None
+    return found, others.coarse(model.name, parameters) if parameters else None

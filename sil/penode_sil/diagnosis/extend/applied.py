@@ -168,9 +168,6 @@ def _sensor(
     return {"value": expression, "unit": s.unit}
 
 
-SAMPLED = ("input_delay", "input_added")  # act on samples, so they come before gains and lags
-
-
 @dataclass
 class Driven:
     """What terms of inputs and late sensors add to a model file: entries by section, what stands for an input now (`acts`), its offset, and
@@ -212,7 +209,7 @@ def _driven(model: Model, fit: Fit, terms: Sequence[Term], taken: set[str]) -> D
         found.acts[name] = name
         for t in mine:
             value = fit.value(t.free[0].target)
-            if t.form.how == "input_offset" and not any(name in e.ends for e in model.elements):
+            if drives.is_constant(t.form) and not any(name in e.ends for e in model.elements):
                 found.offsets[name] = found.name(f"{name}_offset")
                 unit = units.si(next(i.unit for i in model.inputs if i.name == name))
                 found.parameters.append(f"{found.offsets[name]} = {table({'value': value, 'unit': unit})}")
@@ -246,7 +243,7 @@ def _actuator(model: Model, t: Term, value: float, source: str, found: Driven) -
                 continue
             law[key] = found.name(f"{name}_{stem}")
             found.parameters.append(f"{law[key]} = {table({'value': size, 'unit': drives.of_input(of, unit)})}")
-    elif t.form.how in SAMPLED and round(samples) >= 1:
+    elif (t.form.series or drives.is_late(t.form)) and round(samples) >= 1:
         law = {"law": "held" if t.form.series else "delay", "samples": round(samples)}
         if abs(samples - round(samples)) > 0.1:
             found.left.append(f"{t.form.how} of {name} is {samples:.2f} samples; the model file has {round(samples)}")

@@ -34,7 +34,7 @@ from .changes import difference, price
 from .figure import pretty
 from .forces import surface
 from .panels import panel
-from .words import between, command, common, duration, gains, headline, key_figures, lead, percent, relative, sentence, sure, value
+from .words import between, command, common, duration, gains, headline, key_figures, lead, percent, relative, sentence, value
 
 BUDGET = 60_000  # points of all lines over time together, so that the page stays small
 
@@ -62,7 +62,6 @@ def render(model: Model, d: Diagnosis, extended: Path) -> str:
         "pretty": pretty,
         "percent": percent,
         "value": value,
-        "sure": sure,
         "sentence": sentence,
         "duration": duration,
     }

@@ -45,11 +45,6 @@ def between(low: float, high: float, unit: str) -> str:
     return f"{value(low * factor)} … {value(high * factor)} {pretty(shown)}".removesuffix(" 1")
 
 
-def sure(confidence: float) -> str:
-    """A confidence; nothing is certain."""
-    return "> 99 %" if confidence > 0.99 else percent(confidence)
-
-
 def relative(c: Cause, name: str) -> str:
     """Half of a 95 % interval as a share of the value."""
     v = c.parameters[name]
@@ -158,7 +153,7 @@ def key_figures(d: Diagnosis) -> list[tuple[str, str, str]]:
     if named := known(d):
         found.append(("Explained", percent(d.explained), "of the avoidable residual, in training"))
         least = min(c.confidence for c in named)
-        found.append(("Confidence", sure(least), "against the next best answer"))
+        found.append(("Confidence", percent(least), "against the next best answer"))
     return [*found, cost(d)]
 
 

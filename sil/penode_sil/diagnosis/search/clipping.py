@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from penode_gen.model import Model, Parameter
 
+from ..catalogue import others
 from ..catalogue.form import Form
 from ..evidence.bench import FAR, Bench
 from ..evidence.fit import likelihood
@@ -19,7 +20,6 @@ from ..evidence.screening import Score, as_they_are
 from ..study.fit import Free
 
 Array = NDArray[np.float64]
-KIND = "sensor_clipping"
 SHARES = (0.98, 0.94, 0.88, 0.8, 0.7)  # quantiles of abs(y) that are tried as limits
 SOFT = "soft"  # note on a form that comes near its limit smoothly
 TINY = 1e-9  # of the limit, which has a logarithm
@@ -53,7 +53,7 @@ def propose(bench: Bench, index: int, seen: Sequence[Array]) -> list[tuple[Score
     found = []
     for each, sizes, note in ((gains, limits, ""), (gained(soft, SHARP), soft, SOFT)):
         best = int(np.argmax(each))
-        form = Form(KIND, bench.model.sensors[index].name, "clip", index, note=note, limit=sizes[best])
+        form = others.limited(bench.model.sensors[index].name, index, sizes[best], note)
         found.append((Score(each[best], np.ones(1 + bool(note))), form))
     return found
 
@@ -65,7 +65,7 @@ def _cut(x: Array, limit: float, sharp: float) -> Array:
 
 def _gains_of_nominal(bench: Bench, index: int, limits: Sequence[float]) -> list[float]:
     """Log likelihood gained by each limit of a sensor with nominal parameters: those fitted to clipped data give too little motion."""
-    form = Form(KIND, bench.model.sensors[index].name, "clip", index, limit=limits[0])
+    form = others.limited(bench.model.sensors[index].name, index, limits[0])
     model, (limit,) = limited(bench.model, form, "x0_0", least(bench, index))
     problem, free = bench.problem(model), (*bench.nominal, limit)
     shifts = np.zeros((len(limits), len(free)))

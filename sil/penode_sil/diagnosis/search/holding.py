@@ -21,6 +21,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..catalogue import drives
 from ..catalogue.form import Form
 from ..evidence.bench import AGAIN, CORRELATION, Bench, fit_level
 from ..evidence.blocks import Blocks
@@ -34,7 +35,6 @@ Array = NDArray[np.float64]
 SPREAD = 0.75, 1.35  # bounds of the search for a period, in units of twice the fitted delay
 FINER = 3.0  # frequencies tried, of the widths of one, 1/(length of the recordings)
 MOST = 1200  # of them: the finest periods of long recordings are left out
-KIND = "input_hold"
 
 
 def held(u: Array, period: float, phase: float) -> Array:
@@ -57,15 +57,15 @@ def propose(bench: Bench, index: int, delay: float) -> Form | None:
     fitted = 1 + len(bench.records)  # the period, and a phase for each recording
     if about * SPREAD[1] <= 2.0 or sum(moves) < fitted + fitted:
         return None
-    return Form(KIND, bench.model.inputs[index].name, "input_added", index, series=_likeliest(_finer(bench, about), index, about))
+    return drives.hold(bench.model, index, _likeliest(_finer(bench, about), index, about))
 
 
 def told_apart(bench: Bench, trials: Sequence[Trial]) -> list[Trial]:
     """The trials of a round, with each hold scored against the delay of the same input at an update rate
     that resolves its steps. Other trials keep their scores: interpolating between the samples of a late sensor lowers its noise, which
     would bias the comparison."""
-    delays = {t.form.index: t for t in trials if t.form.how == "input_delay"}
-    return [_against(bench, t, delays[t.form.index]) if t.form.kind == KIND and t.form.index in delays else t for t in trials]
+    delays = {t.form.index: t for t in trials if drives.is_late(t.form)}
+    return [_against(bench, t, delays[t.form.index]) if t.form.series and t.form.index in delays else t for t in trials]
 
 
 def _against(bench: Bench, hold: Trial, delay: Trial) -> Trial:

@@ -14,7 +14,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from .. import catalogue
-from ..catalogue import drives, friction
+from ..catalogue import drives, friction, others
 from ..catalogue.form import Form, Motion, Sizes
 from ..evidence.bench import Bench, build
 from ..evidence.blocks import posterior
@@ -63,13 +63,12 @@ class Answer:
     def without(self, gone: Collection[tuple[str, str]]) -> Answer:
         """The same without some laws or offsets, by kind and place, and with the rest fitted again."""
         bench, gone = self.found.bench, {*self.gone, *gone}
-        targets = {f.target for t in self.found.terms if name_of(t) in gone for f in t.free} | {
-            bias(w) for k, w in gone if k == "sensor_bias"
-        }
+        targets = {f.target for t in self.found.terms if name_of(t) in gone for f in t.free}
+        targets |= {bias(w) for k, w in gone if k == others.OFFSET}
         free = [f for f in self.run.free if f.target not in targets]
         run = bench.problem().solve(free, Filter.none(*bench.fit.by.gain.shape), FREE_RUN)
         causes = tuple(c for c in self.causes if (c.kind, c.where) not in gone)
-        offsets = tuple(s for s in self.offsets if ("sensor_bias", s) not in gone)
+        offsets = tuple(s for s in self.offsets if (others.OFFSET, s) not in gone)
         withheld = tuple(c for c in self.withheld if (c.kind, c.where) not in gone)
         notes = tuple(n for n in self.notes if not any(n.startswith(place(*name)) for name in gone))
         return replace(self, causes=causes, withheld=withheld, notes=notes, run=run, offsets=offsets, gone=frozenset(gone))

@@ -173,9 +173,9 @@ def _moved_gain(bench: Bench, form: Form) -> float:
 
 def _holds(bench: Bench, trials: Sequence[Trial], terms: Sequence[Term]) -> list[Form]:
     """Holds of inputs of which a delay gained at least half as much as the best trial: the delay is the main effect of a hold."""
-    taken = [t.form.where for t in terms if t.form.kind == holding.KIND]
+    taken = [t.form.where for t in terms if t.form.series]
     most = max((t.gain for t in trials), default=0.0)
-    late = [t for t in trials if t.form.how == "input_delay" and t.form.where not in taken and t.gain > max(0.5 * most, PROMISE)]
+    late = [t for t in trials if drives.is_late(t.form) and t.form.where not in taken and t.gain > max(0.5 * most, PROMISE)]
     found = [holding.propose(bench, t.form.index, t.fit.value(t.term.free[0].target)) for t in late]
     return [form for form in found if form]
 

@@ -214,13 +214,11 @@ def _of_signal(bench: Bench, term: Term, fit: Fit) -> float:
     own = ACTUATORS.get(term.form.how)
     if own and (own.by_change or not own.small):
         return own.change(drive(bench, term.form.index), value)
+    if own and own.size[1] == "1":
+        return abs(value)
     match term.form.how:
-        case "input_offset":
-            return abs(value) / drive(bench, term.form.index).spread
         case "scale":
             return abs(value - 1.0)
-        case "input_gain":
-            return abs(value)
         case "input_added" if term.form.series:
             return abs(value) * _rms(np.concatenate(list(term.form.series.signals))) / drive(bench, term.form.index).spread
     return abs(value) * turn
