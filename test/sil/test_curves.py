@@ -48,6 +48,12 @@ def test_a_degressive_damper_with_a_corner_has_two_slopes():
     assert part.along(Moved(v, v, np.arange(5.0))) == pytest.approx([0.2, 0.0, 0.0, 0.0, -0.1], abs=1e-15)
 
 
+def test_a_tyre_may_be_nonlinear_only_where_it_is_pressed_in():
+    s = np.array([-0.02, -0.01, 0.0, 0.01])
+    part = Part(tyres.PRESSED, ("quadratic", "N/m^2"))
+    assert part.along(Moved(s, 0.0 * s, np.arange(4.0))) == pytest.approx([4e-4, 1e-4, 0.0, 0.0], abs=1e-18)
+
+
 def test_the_quadratic_of_a_tyre_is_the_load_of_one_that_is_pressed_in():
     """s < 0 is pressed in: there the law pushes with a force below zero."""
     found = tyres.sizes(Form("tyre_nonlinear", "tyre", "force", 0), Sizes({(0, "quadratic"): -2e6}, {}, moving=True))

@@ -35,6 +35,7 @@ RIVALS = {
 }
 STRAIGHT = ("tyre_nonlinear",)
 ROUNDED = "-stiffness*(max(s - static, 0) + rounding*log(1 + exp(-abs(s - static)/rounding)))"
+PRESSED = "quadratic*min(s, 0)^2"  # stretched, it has its own stiffness
 SHARES = (0.3, 0.6)  # of the greatest stretch: where a tyre leaves the road
 
 
@@ -54,7 +55,8 @@ def forms(model: Model, index: int, place: Place, motion: Motion) -> Iterable[Fo
         )
         left = {"static": (share * top, "m"), "rounding": (0.1 * top, "m")}  # the contact patch gets smaller first
         yield Form(KINDS[1], place.name, "force", index, (Part(ROUNDED, ("stiffness", "N/m"), left, 1, span=2.0),), "rounded")
-    yield Form(KINDS[2], place.name, "force", index, (Part("quadratic_spring", ("quadratic", "N/m^2")),))
+    for law, note in (("quadratic_spring", ""), (PRESSED, "where it is pressed in")):
+        yield Form(KINDS[2], place.name, "force", index, (Part(law, ("quadratic", "N/m^2")),), note)
 
 
 def sizes(form: Form, v: Sizes) -> dict[str, tuple[str, float]]:
