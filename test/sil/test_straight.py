@@ -13,6 +13,7 @@ import pytest
 from one_mass import STEP, model
 from samples import sample
 
+from penode_sil.diagnosis.catalogue.form import Motion, Moved, Part
 from penode_sil.diagnosis.search import straight
 
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 12.0
@@ -32,6 +33,22 @@ SENSORS = 'x = { value = "x", unit = "m", noise = 1e-5 }'
 )
 def test_a_parameter_is_off_where_no_slope_is_that_of_the_file(own, slopes, off):
     assert straight.off(60.0, own, slopes, 0.05) is off
+
+
+@pytest.mark.parametrize(
+    "law, shapes, quantity, share", [("maxwell_bushing", {}, "s", 1.0), ("loose_damper", {"gap": (0.0, "m")}, "v", -1.0)]
+)
+@pytest.mark.parametrize("turn", (0.1, 0.5, 2.0))
+def test_a_law_with_memory_has_the_slope_of_its_motion(law, shapes, quantity, share, turn):
+    """In a sine of w tau = `turn`, (w tau)^2/(1 + (w tau)^2) of that in fast motion: more where it acts in parallel, less where it takes
+    from an element. Of 100 periods, the start, which decays with tau, changes 1/(100 pi) of that at most."""
+    tau = 0.05
+    rate = turn / tau
+    t = np.linspace(0.0, 200.0 * np.pi / rate, 200_001)
+    gain = ("damping", "N*s/m") if quantity == "v" else ("stiffness", "N/m")
+    motion = Motion.of([Moved(0.01 * np.sin(rate * t), 0.01 * rate * np.cos(rate * t), t)])
+    slope = straight.slope_along(Part(law, gain, {**shapes, "relaxation": (tau, "s")}), motion, quantity)
+    assert slope == pytest.approx(share * turn**2 / (1.0 + turn**2), abs=0.004)
 
 
 def recording(path, stiffness: float, difference: float, waves: float, quadratic: float = 0.0) -> None:
@@ -88,6 +105,22 @@ def test_an_asymmetric_spring_about_the_stiffness_of_the_file(tmp_path, penode, 
     assert [c["kind"] for c in found["causes"]] == ["asymmetric_spring"]
     shares = [float(n.split(": ")[1].split("%")[0]) for n in found["notes"] if n.startswith("asymmetric spring at spring is small")]
     assert len(shares) == (difference < 0.1) and all(0.3 * difference < 0.01 * x < 1.2 * difference for x in shares)
+
+
+@pytest.mark.parametrize(
+    "off, waves, named", sample(((0.0, 0.0, []), (0.02, 0.0, ["k"]), (0.02, 0.03, []), (0.15, 0.03, ["k"])), (0.02, 0.0, ["k"]))
+)
+def test_a_stiffness_without_a_tolerance(tmp_path, penode, off, waves, named):
+    """Where nothing else is wrong it is named from any size on, with its value; in a world of waves of 3 % it may have taken these."""
+    stated = f'value = {STIFFNESS}, unit = "N/m"'
+    text = model(MASS, STIFFNESS, DAMPING, 0.03, SENSORS)
+    (tmp_path / "rig.toml").write_text(text.replace(f"{stated}, tolerance = 0.03", stated))
+    recording(tmp_path / "train.csv", (1.0 + off) * STIFFNESS, 0.0, waves)
+    penode("diagnose", tmp_path / "rig.toml", "--data", tmp_path / "train.csv", "-o", tmp_path / "out")
+    causes = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["causes"]
+    assert [c["where"] for c in causes if c["kind"] == "wrong_parameter"] == named
+    if waves == 0.0:
+        assert len(causes) == len(named) and all(c["parameters"]["k"]["value"] == pytest.approx(1.02 * STIFFNESS, rel=1e-3) for c in causes)
 
 
 def test_a_spring_that_is_stiffer_on_one_side_the_farther_it_goes(tmp_path, penode):

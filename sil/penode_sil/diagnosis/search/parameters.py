@@ -22,9 +22,9 @@ from ..result import EXTENDED, Cause, Value
 from ..study.study import guessed
 from . import straight
 from .innovate import Found
-from .rounds import terms_of
+from .rounds import MIN_GAIN, terms_of
 from .terms import Term
-from .worth import Z_95, least, shift, systematic, undetermined
+from .worth import WORTH, Z_95, least, shift, systematic, undetermined, wrong
 
 COMMON = f"masses, stiffnesses and dampings that are off by a common factor have the same effect; {EXTENDED} has that form"
 
@@ -56,15 +56,16 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
         value, beside, unit = plain.value(p.name), whole[p.name], units.si(p.unit)
         size, sd = known[p.name]
         log(f"{p.name}: {value / p.value - 1.0:+.2%}, deviation {sd / abs(p.value):.2%}, {size:.1%} of the force there")
-        if abs(value - p.value) <= _limit(p) * abs(p.value) + Z_95 * sd:
+        limit = _limit(p, found.possible)
+        if abs(value - p.value) <= _slack(p, limit, sd):
             continue
-        if p.name in shared and not straight.off(p.value, value, shared[p.name], _limit(p)):
+        if p.name in shared and not straight.off(p.value, value, shared[p.name], limit):
             notes.append(f"{p.name} is {value:.4g} {unit} together with the cause found at its place, which has a linear part too")
         elif size < least(found.possible, 0.0):
             notes.append(
                 f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than unmodelled effects can"
             )
-        elif not straight.off(p.value, beside, shared_by_all.get(p.name, (0.0, 0.0)), _limit(p)):
+        elif not straight.off(p.value, beside, shared_by_all.get(p.name, (0.0, 0.0)), limit):
             absorbed.append(p.name)
             notes.append(
                 f"{p.name} is {value:.4g} {unit} without the small deviations that were found, "
@@ -97,9 +98,17 @@ def notes_on_guessed(model: Model, fit: Fit) -> list[str]:
     return [f"fitted, because the file gives only a guess: {', '.join(found)}{only}"] if found else []
 
 
-def _limit(p: Parameter) -> float:
-    """Largest relative deviation that is no cause: the tolerance, or UNSTATED if the file states none."""
-    return p.tolerance if p.tolerance > 0.0 else UNSTATED
+def _limit(p: Parameter, level: float = WORTH) -> float:
+    """Largest relative deviation that is no cause: the tolerance, or, if the file states none, UNSTATED in a world that is that wrong
+    beside all that was found (`level`), and less in one that is nearly right: there is nothing else for a value to make up for."""
+    return p.tolerance if p.tolerance > 0.0 else UNSTATED * wrong(level)
+
+
+def _slack(p: Parameter, limit: float, sd: float) -> float:
+    """By how much a value that is known to `sd` may be off and no cause: by its relative `limit`; where the file states no tolerance, at
+    least by as many deviations as gain MIN_GAIN, which any cause has to."""
+    needed = 0.0 if p.tolerance else float(np.sqrt(2.0 * MIN_GAIN))
+    return max(limit * abs(p.value) + Z_95 * sd, needed * sd)
 
 
 def _size(p: Parameter, value: float, sd: float, shared: Mapping[str, straight.Slopes]) -> Value:

@@ -18,7 +18,7 @@ from penode_gen import laws
 from penode_gen.model import Model
 
 from ..catalogue import values as of_values
-from ..catalogue.form import Motion, Moved
+from ..catalogue.form import Motion, Moved, Part
 from ..evidence.bench import Bench
 from ..plant.plant import Place
 from .terms import Term
@@ -39,13 +39,8 @@ def beside(model: Model, bench: Bench, terms: Sequence[Term], moved: Sequence[Mo
     for k in {t.form.index for t in terms}:
         own, motion = [t for t in terms if t.form.index == k], moved[k]
         for parameter, quantity in _lines(model, bench.places[k]):
-            reach = motion.s_reach if quantity == "s" else motion.v_reach
-            found[parameter] = _slopes(own, bench, quantity, _grid(reach))
+            found[parameter] = _slopes(own, bench, motion, quantity)
     return found
-
-
-def _grid(reach: float) -> Array:
-    return np.linspace(-reach, reach, 401)
 
 
 def _lines(model: Model, place: Place) -> list[tuple[str, str]]:
@@ -54,18 +49,29 @@ def _lines(model: Model, place: Place) -> list[tuple[str, str]]:
     return [(p, LINEAR[e.law]) for e in model.elements if e.name in names and e.law in LINEAR for p in e.arguments.values()]
 
 
-def _slopes(terms: Sequence[Term], bench: Bench, quantity: str, x: Array) -> Slopes:
-    """Slopes of the laws of terms over deflection or rate. One with memory has any slope from 0 to its gain."""
+def _slopes(terms: Sequence[Term], bench: Bench, motion: Motion, quantity: str) -> Slopes:
+    """Slopes of the laws of terms over deflection or rate, as far as these reach. One with memory has any slope from none, which it has in
+    slow motion, to that along the motion: below zero where it takes a part of an element."""
+    reach = motion.s_reach if quantity == "s" else motion.v_reach
+    x = np.linspace(-reach, reach, 401)
     zeros, force, low, high = np.zeros_like(x), np.zeros_like(x), 0.0, 0.0
     along = Moved(*((x, zeros) if quantity == "s" else (zeros, x)), np.arange(0.0, len(x)) * bench.step)
     for gain, part in (pair for term in terms for pair in term.laws(bench.fit.values)):
         known = laws.LAWS.get(part.law)
         if known and known.states:
-            low, high = low + min(gain, 0.0), high + max(gain, 0.0)
+            slope = gain * slope_along(part, motion, quantity)
+            low, high = low + min(slope, 0.0), high + max(slope, 0.0)
         else:
             force = force + gain * part.along(along)
     least, most = _range(force, x)
     return least + low, most + high
+
+
+def slope_along(part: Part, motion: Motion, quantity: str) -> float:
+    """The straight line in the force of a law along a motion, for gain 1."""
+    x, force = (np.concatenate(list(each)) for each in zip(*((getattr(m, quantity), part.along(m)) for m in motion.parts), strict=True))
+    x = x - np.mean(x)
+    return float(x @ force / (x @ x))
 
 
 def _range(force: Array, x: Array) -> Slopes:
