@@ -57,8 +57,8 @@ def larger(case: Case, end: End, table: Table) -> list[tuple[Cause, str]]:
     for c in _named(end):
         own = next((s for s in table.surfaces if c.where in (*s.elements, s.place)), None)
         forces = {k: v.value for k, v in c.parameters.items() if own is not None and v.unit == own.unit("N")}
-        if own is not None and (too := [x for x in forces.values() if abs(x) > float(np.max(np.abs(own.measured)))]):
-            most = number(float(f"{np.max(np.abs(own.measured)):.3g}"))
+        if own is not None and (too := [x for x in forces.values() if abs(x) > own.largest]):
+            most = number(float(f"{own.largest:.3g}"))
             found.append((c, f"would have {too[0]:.3g} {own.unit('N')}, but no more than {most} is measured there; {NOT_NAMED}"))
     return found
 

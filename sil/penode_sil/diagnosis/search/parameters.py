@@ -22,7 +22,7 @@ from ..result import EXTENDED, Cause, Value
 from ..study.study import guessed
 from . import straight
 from .innovate import Found
-from .rounds import MIN_GAIN, terms_of
+from .rounds import MIN_FORM, MIN_GAIN, terms_of
 from .terms import Term
 from .worth import WORTH, Z_95, least, shift, systematic, undetermined, wrong
 
@@ -51,6 +51,7 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
     if gain and abs(gain.parameters["gain"].value - 1.0) >= least(found.possible, 0.0):
         return Judged((replace(gain, confidence=confidence),), (COMMON,), ())
     shared_by_all = straight.beside(model, found.bench, _straight(found.terms), moved)
+    laws = _laws_beside(model, found)
     causes, notes, absorbed = [], [], []
     for p in judged:
         value, beside, unit = plain.value(p.name), whole[p.name], units.si(p.unit)
@@ -61,6 +62,8 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
             continue
         if p.name in shared and not straight.off(p.value, value, shared[p.name], limit):
             notes.append(f"{p.name} is {value:.4g} {unit} together with the cause found at its place, which has a linear part too")
+        elif size < MIN_FORM * laws.get(p.name, 0.0):
+            notes.append(f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than its curve is off")
         elif size < least(found.possible, 0.0):
             notes.append(
                 f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than unmodelled effects can"
@@ -74,6 +77,17 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
         else:
             causes.append(of_values.cause(p.name, sizes[p.name], confidence))
     return Judged(tuple(causes), tuple(notes), tuple(absorbed))
+
+
+def _laws_beside(model: Model, found: Found) -> dict[str, float]:
+    """For each parameter of a linear law, the largest share of the force at its place that a named form there has; none where no small form
+    was found, which shows that curves are not quite their textbook forms."""
+    shares: dict[str, float] = {}
+    for a in found.named if found.small else ():
+        place = found.plain.places[a.trial.form.index] if a.trial.form.how == "force" else None
+        for parameter, _ in straight.lines(model, place) if place else ():
+            shares[parameter] = max(shares.get(parameter, 0.0), a.trial.share)
+    return shares
 
 
 def _known(model: Model, found: Found, moved: Sequence[Motion], p: Parameter) -> tuple[float, float]:

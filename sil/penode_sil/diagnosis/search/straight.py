@@ -38,12 +38,12 @@ def beside(model: Model, bench: Bench, terms: Sequence[Term], moved: Sequence[Mo
     found: dict[str, Slopes] = {}
     for k in {t.form.index for t in terms}:
         own, motion = [t for t in terms if t.form.index == k], moved[k]
-        for parameter, quantity in _lines(model, bench.places[k]):
+        for parameter, quantity in lines(model, bench.places[k]):
             found[parameter] = _slopes(own, bench, motion, quantity)
     return found
 
 
-def _lines(model: Model, place: Place) -> list[tuple[str, str]]:
+def lines(model: Model, place: Place) -> list[tuple[str, str]]:
     """Parameters of the linear elements of a place, each with what it is the slope of."""
     names = {n for n, _ in place.elements}
     return [(p, LINEAR[e.law]) for e in model.elements if e.name in names and e.law in LINEAR for p in e.arguments.values()]

@@ -32,7 +32,8 @@ LEAST = 5  # samples of a bin that counts
 class Surface:
     """Restoring force of a place along the smoothed motion: s, v, and forces [n] as measured and as the elements give
     them there; means on a grid of BINS deflections by BINS rates (NaN where fewer than LEAST samples are). `located`: do the sensors show
-    the deflection, and not only how much it changes?"""
+    the deflection, and not only how much it changes? `largest`: magnitude of the measured force in whole recordings; at their ends, which
+    the rest is without, it is that of the fit."""
 
     place: str
     elements: tuple[str, ...]
@@ -44,6 +45,7 @@ class Surface:
     edges: tuple[Array, Array]
     turns: bool = False
     located: bool = True
+    largest: float = np.inf
 
     def unit(self, of_length: str) -> str:
         """A unit of the force there: `of_length`, or the rotational one where the ends turn."""
@@ -119,12 +121,14 @@ def surfaces(study: Study, extended: Model | None, fit: Fit | None) -> list[Surf
     found = []
     for i, place in enumerate(places):
         s, v = (np.concatenate([m[q][:, i] for m in motions])[inner] for q in (0, 1))
-        forces = [np.concatenate([z[:, i] for z in each])[inner] for each in both]
+        whole = [np.concatenate([z[:, i] for z in each]) for each in both]
+        forces = [z[inner] for z in whole]
         edges = np.linspace(*_ends(s), BINS + 1), np.linspace(*_ends(v), BINS + 1)
-        measured = forces[1] + np.concatenate([w[:, i] for w in beside])[inner]
+        measured = whole[1] + np.concatenate([w[:, i] for w in beside])
+        largest = float(np.max(np.abs(measured)))
         names = tuple(name for name, _ in place.elements)
         new = forces[2] if extended else None
-        found.append(Surface(place.name, names, s, v, measured, forces[0], new, edges, place.turns, located[i]))
+        found.append(Surface(place.name, names, s, v, measured[inner], forces[0], new, edges, place.turns, located[i], largest))
     return found
 
 
