@@ -24,7 +24,7 @@ from penode_sil.diagnosis.checks.differing import common
 from penode_sil.diagnosis.checks.written import write_extended
 from penode_sil.diagnosis.extend.entries import extends
 from penode_sil.diagnosis.result import UNKNOWN, Cause, Diagnosis, Gain, Value
-from penode_sil.diagnosis.study import study
+from penode_sil.diagnosis.study import restoring, study
 from penode_sil.diagnosis.study.driven import experiment
 from penode_sil.recordings.measured import load
 
@@ -34,12 +34,13 @@ SAMPLES = 2000
 FRICTION = 4.0  # N
 
 
-def record(path, seed, moving=False, friction=FRICTION, mass=MASS, corner=0.0):
-    """A CSV of the rig with friction, at rest at first, or `moving`; of a speed sensor behind a high-pass [Hz]."""
+def record(path, seed, moving=False, friction=FRICTION, mass=MASS, corner=0.0, level=30.0):
+    """A CSV of the rig with friction, at rest at first, or `moving`, under a push of this `level` [N]; of a speed sensor behind a
+    high-pass [Hz]."""
     rng = np.random.default_rng(seed)
     f = np.fft.rfftfreq(SAMPLES, STEP)
     push = np.fft.irfft(np.where((f > 0.3) & (f < 12.0), np.exp(2j * np.pi * rng.random(f.size)), 0.0), SAMPLES)
-    push = 30.0 * push / np.std(push) * np.minimum(np.arange(SAMPLES) * STEP, 1.0)
+    push = level * push / np.std(push) * np.minimum(np.arange(SAMPLES) * STEP, 1.0)
     force = curve(push, STEP)
 
     def rates(time, x):
@@ -160,6 +161,21 @@ def test_names_without_evidence_are_dropped(tmp_path, cause, note):
     )
     assert found.verdict == "unexplained" and [c.kind for c in found.causes] == ["outside_taxonomy"] and not found.explanations
     assert note in found.notes[-1]
+
+
+def test_a_force_at_the_beginning_is_measured_there(tmp_path):
+    """A rig that is released: the smoother fades over the first twentieth of a recording, but the largest force there counts. Noise of
+    the speed sensor is 1e-3 of 0.3 m/s, its force below 0.1 %; the smoother takes half of that away."""
+    (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.02, SENSORS))
+    nominal = penode_gen.load(tmp_path / "rig.toml")
+    measured = load([record(tmp_path / "free.csv", 1, moving=True, friction=0.0, level=1e-6)], nominal)
+    one = study.null_study(nominal, [experiment(m, nominal) for m in measured])
+    (surface,) = restoring.surfaces(one, None, None)
+    way, speed = np.loadtxt(tmp_path / "free.csv", delimiter=",", skiprows=1, usecols=(2, 3)).T
+    force = np.abs(1e-3 * STIFFNESS * way + DAMPING * speed)
+    late = force[len(force) // 20 :]
+    assert surface.largest == pytest.approx(np.max(force), rel=0.02)
+    assert np.max(np.abs(surface.measured)) == pytest.approx(np.max(late), rel=0.05) and np.max(late) < 0.8 * np.max(force)
 
 
 def test_a_name_about_reversals_needs_reversals(tmp_path):
