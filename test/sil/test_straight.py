@@ -7,14 +7,17 @@ from __future__ import annotations
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from one_mass import STEP, model
 from samples import sample
 
-from penode_sil.diagnosis.catalogue.form import Motion, Moved, Part
-from penode_sil.diagnosis.search import straight
+import penode_gen
+from penode_sil.diagnosis.catalogue.form import Form, Motion, Moved, Part
+from penode_sil.diagnosis.plant.plant import places
+from penode_sil.diagnosis.search import parameters, straight
 
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 12.0
 SENSORS = 'x = { value = "x", unit = "m", noise = 1e-5 }'
@@ -49,6 +52,17 @@ def test_a_law_with_memory_has_the_slope_of_its_motion(law, shapes, quantity, sh
     motion = Motion.of([Moved(0.01 * np.sin(rate * t), 0.01 * rate * np.cos(rate * t), t)])
     slope = straight.slope_along(Part(law, gain, {**shapes, "relaxation": (tau, "s")}), motion, quantity)
     assert slope == pytest.approx(share * turn**2 / (1.0 + turn**2), abs=0.004)
+
+
+@pytest.mark.parametrize("small, shares", [((), {}), (("a small form",), {"k": 0.4, "d": 0.4})])
+def test_a_parameter_is_compared_with_the_laws_at_its_place(tmp_path, small, shares):
+    """With the largest, where small forms show that curves are not the textbook's; forms of inputs are at no place."""
+    (tmp_path / "rig.toml").write_text(model(MASS, STIFFNESS, DAMPING, 0.03, SENSORS))
+    rig = penode_gen.load(tmp_path / "rig.toml")
+    forms = (("coulomb_friction", "force", 0.4), ("cubic_spring", "force", 0.1), ("input_gain", "input_gain", 0.9))
+    named = [SimpleNamespace(trial=SimpleNamespace(form=Form(kind, "there", how, 0), share=share)) for kind, how, share in forms]
+    found = SimpleNamespace(named=named, small=small, plain=SimpleNamespace(places=places(rig)))
+    assert parameters.laws_beside(rig, found) == shares
 
 
 def recording(path, stiffness: float, difference: float, waves: float, quadratic: float = 0.0) -> None:

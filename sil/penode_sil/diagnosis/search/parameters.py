@@ -51,7 +51,7 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
     if gain and abs(gain.parameters["gain"].value - 1.0) >= least(found.possible, 0.0):
         return Judged((replace(gain, confidence=confidence),), (COMMON,), ())
     shared_by_all = straight.beside(model, found.bench, _straight(found.terms), moved)
-    laws = _laws_beside(model, found)
+    laws = laws_beside(model, found)
     causes, notes, absorbed = [], [], []
     for p in judged:
         value, beside, unit = plain.value(p.name), whole[p.name], units.si(p.unit)
@@ -60,14 +60,13 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
         limit = _limit(p, found.possible)
         if abs(value - p.value) <= _slack(p, limit, sd):
             continue
+        much = f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there"
         if p.name in shared and not straight.off(p.value, value, shared[p.name], limit):
             notes.append(f"{p.name} is {value:.4g} {unit} together with the cause found at its place, which has a linear part too")
         elif size < MIN_FORM * laws.get(p.name, 0.0):
-            notes.append(f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than its curve is off")
+            notes.append(f"{much}: no more than the curve of the cause there may be off")
         elif size < least(found.possible, 0.0):
-            notes.append(
-                f"{p.name} is {value:.4g} {unit}, which changes {size:.1%} of the force there: no more than unmodelled effects can"
-            )
+            notes.append(f"{much}: no more than unmodelled effects can")
         elif not straight.off(p.value, beside, shared_by_all.get(p.name, (0.0, 0.0)), limit):
             absorbed.append(p.name)
             notes.append(
@@ -79,7 +78,7 @@ def judge(model: Model, found: Found, moved: Sequence[Motion], confidence: float
     return Judged(tuple(causes), tuple(notes), tuple(absorbed))
 
 
-def _laws_beside(model: Model, found: Found) -> dict[str, float]:
+def laws_beside(model: Model, found: Found) -> dict[str, float]:
     """For each parameter of a linear law, the largest share of the force at its place that a named form there has; none where no small form
     was found, which shows that curves are not quite their textbook forms."""
     shares: dict[str, float] = {}
