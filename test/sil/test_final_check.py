@@ -298,9 +298,25 @@ def test_names_are_withdrawn_where_the_hold_out_as_a_whole_is_predicted_worse(se
     noise = np.array([0.05, 0.05])
     rows = [row(role, j, *pair) for role, pairs in errors.items() for j, pair in enumerate(pairs)]
     table = SimpleNamespace(rows=rows, noise=noise, of=lambda role: [r for r in rows if r.figure.role == role])
-    end = SimpleNamespace(answer=SimpleNamespace(causes=(Cause("bump_stop", "spring", {}, 0.9),)), faults=())
-    case = SimpleNamespace(holdout=("far.csv",))
-    assert rules.misled(case, end, table) == (["way"] if withdrawn else [])
+    assert rules.misled(*ended_with_a_stop(0.0), table) == (["way"] if withdrawn else [])
+
+
+@pytest.mark.parametrize(("corner", "withdrawn"), [(0.0, True), (5.0, False)])
+def test_names_are_not_withdrawn_for_the_drift_of_a_hold_out(corner, withdrawn):
+    """A swing of 20 Hz is a tenth of what it is without the cause, a drift twice that; the plant swings from 5 Hz on."""
+    t = STEP * np.arange(1000)
+    swing, drift = np.sin(2.0 * np.pi * 20.0 * t), t
+    table_rows = [row(role, 0, *pair) for role, pair in (("training", (1.0, 0.1)), ("hold-out", (1.0, 1.5)))]
+    table_rows[1].errors = {"nominal": 0.5 * swing + drift, "extended": 0.05 * swing + 2.0 * drift}
+    table = SimpleNamespace(rows=table_rows, noise=np.array([0.01]), of=lambda role: [r for r in table_rows if r.figure.role == role])
+    assert rules.misled(*ended_with_a_stop(corner), table) == (["way"] if withdrawn else [])
+
+
+def ended_with_a_stop(corner):
+    """What a rule asks of a case and of its end with a stop that is named, for a plant that swings from `corner` [Hz] on beside a drift."""
+    study = SimpleNamespace(linear=SimpleNamespace(beside_drift=corner))
+    end = SimpleNamespace(answer=SimpleNamespace(causes=(Cause("bump_stop", "spring", {}, 0.9),)), faults=(), study=study)
+    return SimpleNamespace(holdout=("far.csv",), model=SimpleNamespace(sample_time=STEP)), end
 
 
 def row(role, sensor, nominal, extended):

@@ -230,6 +230,14 @@ class Linear:
         """The highest natural frequency [Hz], 0 without states."""
         return float(np.max(np.abs(np.linalg.eigvals(self.a)), initial=0.0) / (2.0 * np.pi))
 
+    @cached_property
+    def beside_drift(self) -> float:
+        """The lowest frequency [Hz] at which a plant swings that drifts too, for nothing brings one of its motions back; 0 for others."""
+        modes = np.linalg.eigvals(self.a)
+        size, swings = np.abs(modes), np.abs(modes.imag) > np.abs(modes.real)
+        drifts = bool(np.any(np.isclose(size, 0.0, atol=1e-6 * np.max(size, initial=0.0))))
+        return float(np.min(size[swings]) / (2.0 * np.pi)) if drifts and swings.any() else 0.0
+
 
 def linearise(model: Model, found: Sequence[Place], x: Array, u: Array) -> Linear:
     """Mean slopes of the model along states x [n, n_x] and inputs u [n, n_u]."""
