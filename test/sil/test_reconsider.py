@@ -16,6 +16,7 @@ from penode_sil.diagnosis.catalogue.form import Form, Part
 from penode_sil.diagnosis.evidence.gain import Level
 from penode_sil.diagnosis.evidence.prior import Stated
 from penode_sil.diagnosis.search import rounds
+from penode_sil.diagnosis.search.innovate import Ended
 from penode_sil.diagnosis.search.reconsider import needed, reconsidered
 from penode_sil.diagnosis.search.rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, _is_sure, simplest
 from penode_sil.diagnosis.search.terms import Term, Trial
@@ -350,3 +351,19 @@ def test_more_laws_have_to_gain_less_where_little_is_unmodelled(level, laws, eno
     for more, kind in ((0.9 * enough, "coulomb_friction"), (1.1 * enough, "stribeck_friction")):
         trials = [friction("stribeck_friction", laws, 1000.0 + more, level), friction("coulomb_friction", NESTED[:1], 1000.0, level)]
         assert simplest(trials, np.zeros(4), ()).form.kind == kind
+
+
+@pytest.mark.parametrize(
+    ("large", "names", "kept"),
+    [
+        ((True, True, False), (True, True, False), ()),  # what is small has no name, and nothing makes up for it
+        ((True, True, False), (False, True, False), ("coulomb_friction", "cubic_spring")),
+        ((True, False, False), (False, False, False), ("coulomb_friction", "cubic_spring")),
+        ((True, True, True), (False, True, False), ("coulomb_friction",)),
+    ],
+)
+def test_a_search_resumes_without_large_forms_that_make_up_for_others(large, names, kept):
+    forms = tuple(accepted(k, trial(name, 100.0)) for k, name in enumerate(("square", "friction", "cubic")))
+    ended = Ended(Grown(None, np.zeros(4), forms, large, ()), list(names), None, 0.0)
+    assert kinds(ended.without_what_makes_up()) == kept
+    assert len(ended.of_names) == sum(names)

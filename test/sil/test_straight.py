@@ -125,7 +125,7 @@ def test_an_asymmetric_spring_about_the_stiffness_of_the_file(tmp_path, penode, 
     "off, waves, named", sample(((0.0, 0.0, []), (0.02, 0.0, ["k"]), (0.02, 0.03, []), (0.15, 0.03, ["k"])), (0.02, 0.0, ["k"]))
 )
 def test_a_stiffness_without_a_tolerance(tmp_path, penode, off, waves, named):
-    """Where nothing else is wrong it is named from any size on, with its value; in a world of waves of 3 % it may have taken these."""
+    """Where nothing else is wrong it is named from a thousandth on, with its value; in a world of waves of 3 % it may have taken these."""
     stated = f'value = {STIFFNESS}, unit = "N/m"'
     text = model(MASS, STIFFNESS, DAMPING, 0.03, SENSORS)
     (tmp_path / "rig.toml").write_text(text.replace(f"{stated}, tolerance = 0.03", stated))

@@ -21,7 +21,7 @@ from ..evidence.fit import Fit
 from ..result import EXTENDED, Cause, Value
 from ..study.study import guessed
 from . import straight
-from .innovate import Found
+from .innovate import FINEST, Found
 from .rounds import MIN_FORM, MIN_GAIN, terms_of
 from .terms import Term
 from .worth import WORTH, Z_95, least, shift, systematic, undetermined, wrong
@@ -113,8 +113,9 @@ def notes_on_guessed(model: Model, fit: Fit) -> list[str]:
 
 def _limit(p: Parameter, level: float = WORTH) -> float:
     """Largest relative deviation that is no cause: the tolerance, or, if the file states none, UNSTATED in a world that is that wrong
-    beside all that was found (`level`), and less in one that is nearly right: there is nothing else for a value to make up for."""
-    return p.tolerance if p.tolerance > 0.0 else UNSTATED * wrong(level)
+    beside all that was found (`level`), and less in one that is nearly right: there is nothing else for a value to make up for. No value is
+    known better than to FINEST."""
+    return p.tolerance if p.tolerance > 0.0 else max(UNSTATED * wrong(level), FINEST)
 
 
 def _slack(p: Parameter, limit: float, sd: float) -> float:
