@@ -60,8 +60,8 @@ class Found:
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own.
     Where none is large, it looks again with an observer that corrects less: one that follows all that moves hides what happens seldom.
-    Where a large one only makes up for others, it resumes without it: that may have hidden what is there, if more has
-    a name then and predicts as well."""
+    Where a large one only makes up for others, it may hide one of them: the search resumes without it, and that end counts if more has a
+    name in it and it predicts as well."""
     rounds = Rounds(bench, Blocks.moving(bench), log)
     end = reconsidered(rounds, rounds.grow())
     if not any(end.large) and bench.level.size > 0.0:
