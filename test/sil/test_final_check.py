@@ -23,6 +23,7 @@ from penode_sil.diagnosis.checks.case import Case, End
 from penode_sil.diagnosis.checks.differing import common
 from penode_sil.diagnosis.checks.written import write_extended
 from penode_sil.diagnosis.extend.entries import extends
+from penode_sil.diagnosis.plant.plant import Linear
 from penode_sil.diagnosis.result import UNKNOWN, Cause, Diagnosis, Gain, Value
 from penode_sil.diagnosis.study import restoring, study
 from penode_sil.diagnosis.study.driven import experiment
@@ -310,6 +311,21 @@ def test_names_are_not_withdrawn_for_the_drift_of_a_hold_out(corner, withdrawn):
     table_rows[1].errors = {"nominal": 0.5 * swing + drift, "extended": 0.05 * swing + 2.0 * drift}
     table = SimpleNamespace(rows=table_rows, noise=np.array([0.01]), of=lambda role: [r for r in table_rows if r.figure.role == role])
     assert rules.misled(*ended_with_a_stop(corner), table) == (["way"] if withdrawn else [])
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "to_ground", "swings"),
+    [(400.0, 0.0, True), (400.0, 100.0, False), (0.0, 0.0, False)],  # a free shaft; one with a spring to ground; two that are apart
+)
+def test_a_plant_that_drifts_and_swings(stiffness, to_ground, swings):
+    """Two inertias of 1 and 2 on a shaft: sqrt(k (1 + 1/2)) rad/s, beside an angle that nothing brings back."""
+    a = np.zeros((4, 4))
+    a[0, 1] = a[2, 3] = 1.0
+    a[1, [0, 2]] = -stiffness - to_ground, stiffness
+    a[3, [0, 2]] = 0.5 * stiffness, -0.5 * stiffness
+    none = np.zeros((0, 0))
+    found = Linear(a, none, none, none, none, none, 0, 0).beside_drift
+    assert found == pytest.approx(np.sqrt(1.5 * stiffness) / (2.0 * np.pi) if swings else 0.0, rel=1e-6)
 
 
 def ended_with_a_stop(corner):

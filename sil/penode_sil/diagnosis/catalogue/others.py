@@ -76,11 +76,11 @@ def coarse(model: str, errors: Mapping[str, Value]) -> Cause:
     return _shown("integration_error", model, errors)
 
 
-def _shown(kind: str, where: str, parameters: Mapping[str, Value]) -> Cause:
-    """A cause that samples show by themselves, which no other explains."""
-    return Cause(kind, where, dict(parameters), 0.99)
-
-
 def differing(parameter: str, values: Mapping[str, Value], confidence: float, others: Sequence[str] = ()) -> Cause:
     """A parameter with a value for each recording, with the `others` that may differ as well instead."""
     return Cause(_DIFFERING, parameter, dict(values), confidence, tuple(Named(_DIFFERING, name) for name in others))
+
+
+def _shown(kind: str, where: str, parameters: Mapping[str, Value]) -> Cause:
+    """A cause that samples show by themselves, which no other explains."""
+    return Cause(kind, where, dict(parameters), 0.99)

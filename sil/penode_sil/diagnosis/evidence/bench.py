@@ -22,7 +22,7 @@ from .prior import SHARE, Stated
 
 Array = NDArray[np.float64]
 UPDATES = 16  # a period of the motion
-UNSTATED = 0.05  # tolerance of a parameter for which the file has none: one that is farther off is worth a name
+UNSTATED = 0.05  # tolerance of a parameter for which the file has none
 FAR = 1e3  # factor off the file's value, or off the expected motion, beyond which nothing is believed
 SIZES = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3)  # unmodelled force, relative to all forces: levels that are tried
 CORRELATION = 0.5  # updates for which it stays: about white. One that stays longer winds up against a friction that sticks

@@ -234,9 +234,10 @@ class Linear:
     def beside_drift(self) -> float:
         """The lowest frequency [Hz] at which a plant swings that drifts too, for nothing brings one of its motions back; 0 for others."""
         modes = np.linalg.eigvals(self.a)
-        size, swings = np.abs(modes), np.abs(modes.imag) > np.abs(modes.real)
-        drifts = bool(np.any(np.isclose(size, 0.0, atol=1e-6 * np.max(size, initial=0.0))))
-        return float(np.min(size[swings]) / (2.0 * np.pi)) if drifts and swings.any() else 0.0
+        size = np.abs(modes)
+        drifts = np.isclose(size, 0.0, atol=1e-6 * np.max(size, initial=0.0))  # without any damping two that are nearly zero, and complex
+        swings = (np.abs(modes.imag) > np.abs(modes.real)) & ~drifts
+        return float(np.min(size[swings]) / (2.0 * np.pi)) if drifts.any() and swings.any() else 0.0
 
 
 def linearise(model: Model, found: Sequence[Place], x: Array, u: Array) -> Linear:
