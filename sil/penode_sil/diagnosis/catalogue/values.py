@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from ..result import Cause, Named, Value
 
 KIND = "wrong_parameter"
+ROUNDED = 0.01  # tolerance of a value for which the file states none: it is written to two or three digits
 
 
 def named(parameter: str) -> Named:

@@ -8,7 +8,7 @@ all values that follow the recordings equally well, those that differ from the f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -34,33 +34,41 @@ from .written import heading
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Few:
-    """Parameters, and the fit in which they are free beside the parameters with stated tolerances."""
+    """Parameters, and the fit in which they are free, and all others within their tolerances."""
 
     names: tuple[str, ...]
     fit: Fit
+    nominal: float  # chi2 of the nominal model, fitted within its tolerances
 
     def __repr__(self) -> str:
         return " and ".join(self.names)
 
 
 def few(case: Case, end: End, figures: Table) -> list[Few]:
-    """The fewest parameters without a stated tolerance whose values alone make the nominal model follow the training as well as with all of
-    them free, and as the extended model does; the best first: more than one set, and the recordings do not show which. None if it takes
-    all of them."""
+    """The fewest parameters without a stated tolerance whose values, with the others as exact as they are written, make the nominal model
+    follow the training as well as with all of them free, and as the extended model does; the best first: more than one set, and the
+    recordings do not show which. None if it takes all of them, or if even all of them do not."""
     study, model = end.study, case.model
     unstated = [p for p in model.parameters.values() if _unstated(p)]
     if not unstated:
         return []
-    stated = [uncertain(p) for p in model.parameters.values() if p.tolerance > 0.0 and p.value]
+    known = {p.name: _within(p) for p in model.parameters.values() if p.tolerance > 0.0 and p.value}
+    known |= {p.name: _within(replace(p, tolerance=of_values.ROUNDED)) for p in unstated}
     starts = [f for f in study.null.free if f.target[0] == "start"]
     problem = Problem(model, study.experiments, study.metrics, study.set_name, study.linear.fastest)
     extended = [figures.predicted[e.name][1].at(e.time) for e in study.experiments]
 
+    def fit(names: Sequence[str]) -> Fit:
+        others = [f for name, f in known.items() if name not in names]
+        return problem.solve([*others, *(_free(model.parameters[n]) for n in names), *starts])
+
+    nominal = fit(()).chi2
+
     def fitted(names: Sequence[str]) -> Few:
-        return Few(tuple(names), problem.solve([*stated, *(_free(model.parameters[n]) for n in names), *starts]))
+        return Few(tuple(names), fit(names), nominal)
 
     whole = fitted([p.name for p in unstated])
-    if end.answer.verdict == "unexplained" and not only_noise(study, whole.fit):
+    if _behind(end, whole.fit, extended) or (end.answer.verdict == "unexplained" and not only_noise(study, whole.fit)):
         return []
     for count in range(1, max(len(unstated), 2)):
         found = [fitted(names) for names in _promising(whole, count)]
@@ -101,9 +109,9 @@ def _absorbed(curvature: NDArray[np.float64], kept: list[int], free: list[int]) 
 
 
 def taken(end: End, x: Few) -> float:
-    """Share that values take of the chi2 beyond noise of the nominal model, fitted within its tolerances."""
+    """Share that values take of the chi2 beyond noise of the nominal model."""
     noise = rows(end.study)
-    return float(np.clip(1.0 - (x.fit.chi2 - noise) / max(end.study.null.chi2 - noise, 1e-300), 0.0, 1.0))
+    return float(np.clip(1.0 - (x.fit.chi2 - noise) / max(x.nominal - noise, 1e-300), 0.0, 1.0))
 
 
 def moved(case: Case, model: Model) -> set[str]:
@@ -113,6 +121,11 @@ def moved(case: Case, model: Model) -> set[str]:
 
 def _unstated(p: Parameter) -> bool:
     return not p.exact and not p.tolerance and bool(p.value)
+
+
+def _within(p: Parameter) -> Free:
+    """A parameter within its tolerance, in logarithms as those that are free: a common factor of all is a straight line then."""
+    return replace(uncertain(p), unit=abs(p.value), log=True)
 
 
 def _free(p: Parameter) -> Free:

@@ -11,14 +11,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..study.fit import Free, Target
+from ..study.fit import MOVE, Free, Target
 from .colour import Colour
 from .observer import Filter, Predictor
 from .prior import cost, precisions, slopes as prior_slopes
 
 Array = NDArray[np.float64]
 DAMPING = np.array([0.0, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
-MOVE = 1e-6  # of a unit: finite differences. Larger ones make a common scale of all forces, or a common offset, seem to bend what is seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,11 +138,13 @@ class Problem:
         variance, value = likelihood(here, used, self.floor)
         return Fit(tuple(free), by, here, np.moveaxis(slopes, 0, -1), used, variance, value, value - sum(map(cost, free)))
 
-    def solve(self, free: Sequence[Free], by: Filter, iterations: int = 10, close: float = 0.05) -> Fit:
-        """The likeliest free values from those given on; ends where a step gains less than `close` in the log posterior."""
+    def solve(self, free: Sequence[Free], by: Filter, iterations: int = 10, close: float = 0.01) -> Fit:
+        """The likeliest free values from those given on; ends where a step gains less than `close` in the log posterior, or promises to."""
         fit = self.at(free, by)
         for _ in range(iterations):
-            steps = self._steps(fit)
+            steps, promised = self._steps(fit)
+            if promised < close:
+                break
             nu = self.nu(fit.free, steps, by)
             costs = []
             for k, step in enumerate(steps):
@@ -165,7 +166,7 @@ class Problem:
         parts = [self._at(fit, fit.nu, left, fit.free) for left in lefts]
         shifts = np.zeros((len(lefts), len(fit.free)))
         for _ in range(iterations):
-            steps = np.array([shift + self._steps(part) for shift, part in zip(shifts, parts, strict=True)])  # [lefts, dampings, free]
+            steps = np.array([shift + self._steps(part)[0] for shift, part in zip(shifts, parts, strict=True)])  # [lefts, dampings, free]
             nu = self.nu(fit.free, steps.reshape(-1, len(fit.free)), fit.by).reshape(*steps.shape[:2], *fit.nu.shape)
             gained = 0.0
             for b, left in enumerate(lefts):
@@ -184,7 +185,8 @@ class Problem:
         variance, value = likelihood(nu, used, self.floor)
         return replace(fit, free=free, nu=nu, used=used, variance=variance, likelihood=value, cost=value - sum(map(cost, free)))
 
-    def _steps(self, fit: Fit) -> Array:
+    def _steps(self, fit: Fit) -> tuple[Array, float]:
+        """Steps [DAMPING, free] towards the likeliest values, and how much of the log posterior the full one promises to gain."""
         rows = (fit.slopes / np.sqrt(fit.variance)[None, :, None])[fit.used]
         rest = (fit.nu / np.sqrt(fit.variance))[fit.used]
         curvature = rows.T @ rows + np.diag(precisions(fit.free) ** 2)
@@ -196,7 +198,7 @@ class Problem:
         normed = curvature / np.outer(size, size)
         damped = normed + (1e-10 + DAMPING)[:, None, None] * np.eye(len(size))
         found = np.linalg.solve(damped, (slope / size)[:, None])[..., 0] / size
-        return np.where([f.log for f in fit.free], np.clip(found, -1.0, 1.0), found)
+        return np.where([f.log for f in fit.free], np.clip(found, -1.0, 1.0), found), 0.5 * float(found[0] @ slope)
 
 
 def put(free: Sequence[Free], shift: Array) -> tuple[Free, ...]:

@@ -21,13 +21,13 @@ from penode_gen.model import Model
 
 from ..plant.between import CLOSE, joined, parts
 from ..plant.compiling import compiled, folded, longest, moving, ordered
-from ..plant.plant import anonymous
+from ..plant.plant import KEPT, anonymous
 from .noise import Experiment, Metric, Thinning, thinning
 
 Array = NDArray[np.float64]
-KEPT = 32  # experiments of which spectra and inputs are kept
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
 FAR = 1e20  # residual of a run that cannot be simulated, and the most that it shows
+MOVE = 1e-6  # of a unit: finite differences. Larger ones make a common scale of all forces, or a common offset, seem to bend the sensors
 PROMISE = 0.7  # of the gain that a full step predicts: if that is reached, the derivatives have hardly changed
 DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
 
@@ -285,11 +285,10 @@ class Problem:
         blocks, rows, simulated = [], [], []
         for e in range(len(self.experiments)):
             own = [i for i, f in enumerate(free) if not (f.target[0] in ("start", "own") and f.target[1] != e)]
-            step = 1e-3
             lanes = self.batch.lanes
             shifts = np.zeros((-(-(len(own) + 1) // lanes) * lanes, len(free)))  # whole vectors lie closely in memory
             for k, i in enumerate(own):
-                shifts[k + 1, i] = step if free[i].at(step) != free[i].value else -step
+                shifts[k + 1, i] = MOVE if free[i].at(MOVE) != free[i].value else -MOVE
             z, skews, _ = self.sensors(e, free, shifts)
             r = self.residuals(e, z, skews)
             block = np.zeros((len(free), r.shape[1]))

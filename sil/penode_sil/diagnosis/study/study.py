@@ -15,8 +15,8 @@ from penode_gen.model import Model, Parameter, Signal
 
 from ..evidence.prior import SHARE
 from ..plant import plant
-from ..plant.plant import Linear, Place
-from .fit import KEPT, Fit, Free, Problem
+from ..plant.plant import KEPT, Linear, Place
+from .fit import Fit, Free, Problem
 from .noise import Experiment, Metric, metric, sensor_levels
 from .smoother import Seen, smooth
 
