@@ -135,13 +135,13 @@ def shaken(friction, rough, seconds=8.0):
 def test_damping_does_not_stand_for_friction(tmp_path, rough, force, show):
     """Friction of a seventh of the force in a bearing that is shaken by more than that: a damping that the file does not vouch for takes
     most of it, and leaves a fifth of the misfit to friction. With friction in the model the damping is as the file has it, so friction is
-    the cause."""
+    the cause; its arc tangent has 0.90 of the force on average, at 0.11 rad/s rms."""
     model, experiments = drive(tmp_path, lambda s: K * s, shaken(lambda v: force * 2.0 / math.pi * math.atan(v / 0.005), rough))
     found = answered(model, experiments)
     show([(c.kind, c.where, {k: (v.value, v.ci95) for k, v in c.parameters.items()}) for c in found.causes])
     assert [(c.kind, c.where) for c in found.causes] == [("coulomb_friction", "bearing")]
     low, high = found.causes[0].parameters["force"].ci95
-    assert low < force < high
+    assert low < 0.9 * force < high
 
 
 @pytest.mark.long

@@ -18,9 +18,9 @@ from penode_sil.diagnosis.evidence.prior import Stated
 from penode_sil.diagnosis.search import rounds
 from penode_sil.diagnosis.search.innovate import Ended
 from penode_sil.diagnosis.search.reconsider import needed, reconsidered
-from penode_sil.diagnosis.search.rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, _is_sure, simplest
+from penode_sil.diagnosis.search.rounds import MIN_FORM, Accepted, Grown, _is_sure, simplest
 from penode_sil.diagnosis.search.terms import Term, Trial
-from penode_sil.diagnosis.search.worth import WORTH
+from penode_sil.diagnosis.search.worth import MIN_GAIN, WORTH
 from penode_sil.diagnosis.study.fit import Free
 
 NAMES = {

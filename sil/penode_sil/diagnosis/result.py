@@ -13,10 +13,11 @@ from ..recordings.measured import Measured
 
 OUTSIDE = "outside_taxonomy"  # kind of an effect without a name
 EXTENDED = "model_extended.toml"
+NOT_NAMED = f"not named, but in {EXTENDED}"
 SIZES = {"force", "stiffness", "damping", "mass", "bias", "offset", "delay", "lag", "scale", "gain"}
 SIZES |= {"coefficient", "cubic", "quadratic", "difference"}  # of curves
 NOTHING = {"scale": 1.0, "gain": 1.0}  # sizes without any effect; 0 for others
-MAY_BE_NOTHING = "may be nothing, by the 95 % interval of its size; not named, but in model_extended.toml"
+MAY_BE_NOTHING = f"may be nothing, by the 95 % interval of its size; {NOT_NAMED}"
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from ..catalogue import drives, values as of_values
 from ..catalogue.friction import turns
 from ..reliability import trusted
 from ..report.figure import number
-from ..result import EXTENDED, MAY_BE_NOTHING, OUTSIDE, UNKNOWN, Cause, place
+from ..result import EXTENDED, MAY_BE_NOTHING, NOT_NAMED, OUTSIDE, UNKNOWN, Cause, place
 from ..search.worth import RATIO
 from ..study.noise import UNSEEN
 from ..study.restoring import rms
@@ -31,7 +31,6 @@ from .figures import ROLES, Row, Table, misses, tabled
 from .written import heading, write_extended
 
 NOMINAL = ("nominal", "refitted")
-NOT_NAMED = f"not named, but in {EXTENDED}"
 
 
 @dataclass(frozen=True)
@@ -157,7 +156,7 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
     clear = all(RATIO * r.rms("extended") < min(map(r.rms, NOMINAL)) for r in _missed(table) if r.figure.signal in sensors)
     if end.withheld and (whole or clear):
         names = [place(c.kind, c.where) for c in end.withheld]
-        notes = tuple(n for n in d.notes if not any(n.startswith(f"{name} is real but small") for name in names))
+        notes = tuple(n for n in d.notes if not (n.endswith(NOT_NAMED) and n.startswith(tuple(names))))
         causes = tuple(trusted(c, d.explained) for c in end.withheld)
         sets = ({"causes": [{"kind": c.kind, "where": c.where} for c in causes], "posterior": min(c.confidence for c in causes)},)
         return replace(end, answer=replace(d, causes=causes, explanations=sets, notes=notes))

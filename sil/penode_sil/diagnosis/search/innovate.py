@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,13 +13,12 @@ from ..evidence.bench import Bench
 from ..evidence.blocks import BLOCKS, Blocks
 from ..evidence.fit import Fit
 from ..evidence.observer import Filter, bias
-from .propose import FREE_RUN
-from .reconsider import at_one_place, centred, needed, reconsidered
-from .rounds import LEVEL_FACTORS, MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, is_large, name_of, terms_of
+from ..evidence.screening import Probe
+from .propose import FREE_RUN, motions
+from .reconsider import at_one_place, centred, masses_behind, needed, reconsidered
+from .rounds import LEVEL_FACTORS, MIN_FORM, Accepted, Grown, Rounds, is_large, name_of, terms_of
 from .terms import Term, Trial
-from .worth import RATIO, Z_95, least, mostly, remaining
-
-FINEST = 1e-3  # of a signal, or a value: no channel is calibrated better, nothing weighed
+from .worth import FINEST, MIN_GAIN, RATIO, Z_95, least, mostly, remaining
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +59,8 @@ class Found:
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own.
     Where none is large, it looks again with an observer that corrects less: one that follows all that moves hides what happens seldom.
-    Where a large one only makes up for others, it may hide one of them: the search resumes without it, and that end counts if more has a
-    name in it and it predicts as well."""
+    It resumes without forms that are only other masses. Where a large one only makes up for others, it may hide one of them: the search
+    resumes without it, and that end counts if more has a name in it and it predicts as well."""
     rounds = Rounds(bench, Blocks.moving(bench), log)
     end = reconsidered(rounds, rounds.grow())
     if not any(end.large) and bench.level.size > 0.0:
@@ -69,6 +68,10 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
         again = reconsidered(stiffer, stiffer.grow())
         rounds, end = (stiffer, again) if any(again.large) else (rounds, end)
     ended = _freely(rounds, centred(rounds, end))
+    while ended.masses:
+        rounds = replace(rounds, without=rounds.without | {name_of(a.trial) for a in ended.masses})
+        log(f"only other masses: {sorted(rounds.without)}")
+        ended = _freely(rounds, rounds.grow([a for a in ended.end.accepted if a not in ended.masses]))
     if kept := ended.without_what_makes_up():
         other = _freely(rounds, rounds.grow(kept))
         log(f"without what makes up for others: {[name_of(a.trial) for a in other.of_names]}")
@@ -79,12 +82,14 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
 
 @dataclass(frozen=True, eq=False)
 class Ended:
-    """The end of a search, which of its forms have `names`, the free `run` that fits best, and the unmodelled `level` that remains."""
+    """The end of a search, which of its forms have `names`, the free `run` that fits best, the unmodelled `level` that remains, and forms
+    that are only other `masses`."""
 
     end: Grown
     names: list[bool]
     run: Fit
     level: float
+    masses: list[Accepted] = field(default_factory=list)
 
     @property
     def of_names(self) -> list[Accepted]:
@@ -104,7 +109,10 @@ def _freely(rounds: Rounds, end: Grown) -> Ended:
     level = remaining(bench, run, np.array([s.noise for s in model.sensors]))
     rounds.log(f"what remains: {level:.3g} of all forces")
     end = _run_free(end, level, rounds.log)
-    return Ended(end, needed(rounds, end), run, level)
+    moved = motions(Probe.of(bench)) if any(end.large) else []
+    large = [a for a, big in zip(end.accepted, end.large, strict=True) if big]
+    masses = [a for a in large if masses_behind(bench, a, moved, max(level, bench.level.size))]
+    return Ended(end, needed(rounds, end), run, level, masses)
 
 
 def _run_free(end: Grown, level: float, log: Callable[[str], None]) -> Grown:

@@ -23,13 +23,14 @@ from ..evidence.fit import Fit
 from ..evidence.observer import Filter, Record, bias, sample_noise
 from ..evidence.screening import Probe
 from ..plant.plant import Place
-from ..result import MAY_BE_NOTHING, Cause, Named, Value, place
+from ..result import MAY_BE_NOTHING, NOT_NAMED, Cause, Named, Value, place
 from ..study.fit import Free, Target
 from ..study.noise import Experiment
 from . import innovate, offsets as offsets_of, parameters
 from .innovate import Found
 from .propose import FREE_RUN, motions
-from .rounds import MIN_TAKEN, name_of, of_curve, terms_of
+from .reconsider import at_one_place
+from .rounds import MIN_TAKEN, Accepted, name_of, of_curve, terms_of
 from .terms import Term, Trial
 from .worth import WORTH, Z_95, least, share, systematic, undetermined
 
@@ -114,12 +115,7 @@ def answer(
             withheld.append(cause)
             notes.append(_small(term, f"{size:.1%} of the force there") if size < enough else f"{place(*name_of(term))} {MAY_BE_NOTHING}")
     for a in found.small:
-        what = (
-            f"{a.trial.taken:.0%} of the power of prediction errors"
-            if a.trial.taken < MIN_TAKEN
-            else f"{a.trial.share:.1%} of the force there"
-        )
-        notes.append(_small(a.terms[0], what))
+        notes.append(_withheld(a, found))
         sure = _sure(_weighed(a.trials, a.trial), a.trial.form)
         withheld.append(_cause(model, after, moved, a.terms[0], a.trial.share, (), sure, found.level))
     stopped = () if model.inputs else friction.KINDS  # a free motion ends where friction holds it
@@ -157,7 +153,18 @@ def _searched(model: Model, bench: Bench, log: Callable[[str], None]) -> tuple[F
 
 def _small(t: Term, what: str) -> str:
     """A note on a term that is too small to be named."""
-    return f"{place(*name_of(t))} is real but small: {what}; not named, but in model_extended.toml"
+    return f"{place(*name_of(t))} is real but small: {what}; {NOT_NAMED}"
+
+
+def _withheld(a: Accepted, found: Found) -> str:
+    """A note on an accepted form without a name."""
+    corrected = [x for x in found.named if at_one_place(a, x)]
+    if corrected and a.trial.share >= least(found.level, a.trial.whole):
+        whose = f"{place(*name_of(corrected[0].trial))}, which is not quite the one of its name"
+        return f"{place(*name_of(a.trial))} corrects the curve of {whose}; {NOT_NAMED}"
+    if a.trial.taken < MIN_TAKEN:
+        return _small(a.terms[0], f"{a.trial.taken:.0%} of the power of prediction errors")
+    return _small(a.terms[0], f"{a.trial.share:.1%} of the force there")
 
 
 def _merged(causes: list[Cause], new: Cause) -> list[Cause]:

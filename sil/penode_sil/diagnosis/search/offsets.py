@@ -24,9 +24,8 @@ from ..evidence.screening import Probe
 from ..plant.plant import Place
 from ..result import Cause, Named, Value
 from .propose import SMALL
-from .rounds import MIN_GAIN
 from .terms import Term
-from .worth import WORTH, Z_95, confounded, least, mostly, own_of_sensors, systematic
+from .worth import MIN_GAIN, WORTH, Z_95, confounded, least, mostly, own_of_sensors, systematic
 
 Array = NDArray[np.float64]
 STARTS = 0.5  # values that other start states count for, where an explanation needs them

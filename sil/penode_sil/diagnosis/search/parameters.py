@@ -21,10 +21,10 @@ from ..evidence.fit import Fit
 from ..result import EXTENDED, Cause, Value
 from ..study.study import guessed
 from . import straight
-from .innovate import FINEST, Found
-from .rounds import MIN_FORM, MIN_GAIN, terms_of
+from .innovate import Found
+from .rounds import MIN_FORM, terms_of
 from .terms import Term
-from .worth import WORTH, Z_95, least, shift, systematic, undetermined, wrong
+from .worth import MIN_GAIN, WORTH, Z_95, least, shift, systematic, undetermined, wrong
 
 COMMON = f"masses, stiffnesses and dampings that are off by a common factor have the same effect; {EXTENDED} has that form"
 
@@ -114,8 +114,8 @@ def notes_on_guessed(model: Model, fit: Fit) -> list[str]:
 def _limit(p: Parameter, level: float = WORTH) -> float:
     """Largest relative deviation that is no cause: the tolerance, or, if the file states none, UNSTATED in a world that is `wrong` by
     the `level` beside all that was found, and less in one that is nearly right: there is nothing else for a value to make up for. No value
-    is known better than to FINEST."""
-    return p.tolerance if p.tolerance > 0.0 else max(UNSTATED * wrong(level), FINEST)
+    is more exact than it is written."""
+    return p.tolerance if p.tolerance > 0.0 else max(UNSTATED * wrong(level), of_values.ROUNDED)
 
 
 def _slack(p: Parameter, limit: float, sd: float) -> float:

@@ -23,7 +23,7 @@ from ..evidence.screening import AT_ONCE, Probe, Score, as_they_are, scores
 from ..study.fit import Free
 from . import clipping, holding
 from .terms import Term, Trial, drive, free_of, moves, whole, with_forms
-from .worth import share
+from .worth import MIN_GAIN, share
 
 Array = NDArray[np.float64]
 TRIED = 6  # forms that are fitted in a round, the best of each name and place first; and the best of every other place
@@ -57,7 +57,8 @@ def _inertia(bench: Bench, body: str) -> float:
 
 def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None], stiffer: float = 1.0) -> list[Trial]:
     """The likeliest forms beside those accepted, fitted, the best first. They are looked for by an observer for `stiffer` times less
-    unmodelled force than the bench has, and compared with the bench as it is."""
+    unmodelled force than the bench has, and compared with the bench as it is. None where nothing is unmodelled and none of them promises
+    what a cause has to gain."""
     base, bench = bench.fit, _corrected_less(bench, stiffer)
     probe = Probe.of(bench)
     moved = motions(probe)
@@ -78,8 +79,8 @@ def propose(bench: Bench, terms: Sequence[Term], log: Callable[[str], None], sti
     limits = [pair for j, s in enumerate(bench.model.sensors) if s.name not in cut for pair in clipping.propose(bench, j, seen)]
     actuators = [pair for j in moving for pair in _bent(bench, j, terms)]
     ranked = sorted([*ranked, *limits, *actuators], key=lambda pair: -pair[0].gain)
-    chosen = _chosen(ranked)
     log("screened: " + ", ".join(f"{f.kind} {f.where} {f.note} {s.gain:.0f}" for s, f in ranked[:12]))
+    chosen = _chosen(ranked) if bench.level.size > 0.0 or any(s.gain > MIN_GAIN for s, _ in ranked) else []
     trials = [_fitted(bench, base, form, moved, terms, s.sizes) for s, form in chosen]
     trials = [t for t in trials if t.form.kind]
     trials += [_fitted(bench, base, form, moved, terms, np.ones(1)) for form in _holds(bench, trials, terms)]

@@ -4,20 +4,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from .. import catalogue
 from ..catalogue import others
-from ..catalogue.form import Form
+from ..catalogue.form import Form, Motion
+from ..evidence.bench import Bench
 from ..evidence.observer import bias
+from ..evidence.prior import SHARE, Stated
 from ..evidence.screening import Probe
 from .propose import as_it_is, is_part, motions
-from .rounds import MIN_FORM, MIN_GAIN, Accepted, Grown, Rounds, beyond_twice, moved, name_of, of_curve, score, scored, simplest, terms_of
+from .rounds import MIN_FORM, Accepted, Grown, Rounds, beyond_twice, moved, name_of, of_curve, score, scored, simplest, terms_of
 from .terms import Trial
-from .worth import Z_95, mostly, wrong
+from .worth import MIN_GAIN, Z_95, is_linear, least, mostly, shift, wrong
 
 
 def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
@@ -119,6 +121,18 @@ def needed(rounds: Rounds, grown: Grown) -> list[bool]:
         rounds.log(f"{name_of(least.trial)} gains {gains[least]:.0f} nats beside the others: it makes up for them")
         large, gone, left = [a for a in large if a is not least], [*gone, least], whole - gains[least]
     return [a in large for a in grown.accepted]
+
+
+def masses_behind(bench: Bench, a: Accepted, moved: Sequence[Motion], level: float) -> list[str]:
+    """Masses of bodies at a form's place that are beyond their tolerances beside it and no cause there (see `shift`), where its force is in
+    proportion to the motion: a spring and a damper in series do what another mass does, and this mass takes back what they do too much.
+    The unmodelled `level` remains."""
+    if a.trial.form.how != "force" or not all(is_linear(t, bench.fit, moved[t.form.index]) for t in a.terms):
+        return []
+    ends, free = bench.places[a.trial.form.index].ends, {f.target: f for f in bench.fit.free if isinstance(f, Stated)}
+    masses = [free[b.mass] for b in bench.model.bodies if b.name in ends and b.mass in free]
+    off = [str(f.target) for f in masses if abs(f.value - f.origin) > f.sigma / SHARE]
+    return [m for m in off if shift(bench.model, bench, moved, m) < least(level, 0.0)]
 
 
 def at_one_place(a: Accepted, other: Accepted) -> bool:

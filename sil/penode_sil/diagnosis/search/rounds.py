@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..catalogue import curve
+from ..catalogue.form import Form
 from ..evidence.bench import SIZES, Bench, fit_level
 from ..evidence.blocks import BLOCKS, Blocks
 from ..evidence.fit import Fit, Problem
@@ -23,11 +24,10 @@ from . import holding
 from .adopting import adopt
 from .propose import FOLLOWED, PROMISE, is_part, motions, propose
 from .terms import Term, Trial, without_any
-from .worth import WORTH, Z_95, alone, least, mostly, share, undetermined, wrong
+from .worth import MIN_GAIN, WORTH, Z_95, alone, least, mostly, share, undetermined, wrong
 
 Array = NDArray[np.float64]
 SCORED = 4  # of the promising trials, how many are scored on held-out blocks, beside the one with the best free run
-MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better, at least
 MIN_FORM = (
     0.2  # of what a form gains, which one with more values gains beyond it: waves of 3 % in a spring make a peak of 0.13 of a friction
 )
@@ -61,14 +61,26 @@ class Grown:
 
 
 @dataclass(frozen=True, eq=False)
+class Tried:
+    """The `trials` beside accepted forms, which it keeps, for their identity is the key; the promising ones of them, `scored`."""
+
+    forms: tuple[Form, ...]
+    trials: list[Trial]
+    scored: list[Trial]
+
+
+@dataclass(frozen=True, eq=False)
 class Rounds:
     """Rounds of a search that starts from a bench without any cause. Causes are proposed by an observer for `stiffer` times less unmodelled
-    force than there is."""
+    force than there is. What was `tried` beside the same forms before is taken from there. Names of forms that are not to be found again
+    are `without`."""
 
     start: Bench
     blocks: Blocks
     log: Callable[[str], None]
     stiffer: float = 1.0
+    tried: dict[tuple[object, ...], Tried] = field(default_factory=dict)
+    without: frozenset[tuple[str, str]] = frozenset()
 
     def grow(self, accepted: Sequence[Accepted] = ()) -> Grown:
         """Accepts causes beside those accepted already, one at a time, the best predictor first, until none predicts enough better, or the
@@ -106,8 +118,7 @@ class Rounds:
         """Two causes that together predict left-out blocks better than `scores`, where no cause does alone: the delay and the friction of a
         drive that starts from rest. Empty without any."""
         best, total = [], float(np.sum(scores)) + 2.0 * MIN_GAIN
-        trials = propose(bench, (), self.log, self.stiffer)
-        for t in (scored(bench, self.blocks, x) for x in trials[:SCORED]):
+        for t in (scored(bench, self.blocks, x) for x in self.trials(bench, ()).trials[:SCORED]):
             beside, terms = adopt(bench, t, 0)
             beside, level = _based(beside, self.blocks)
             first = Accepted(t, 0, tuple(terms), (t,))
@@ -139,14 +150,22 @@ class Rounds:
         fit = problem.solve([f for f in bench.fit.free if f.target not in own], bench.fit.by, FOLLOWED) if own else bench.fit
         return float(np.sum(self.blocks.scores(problem, fit))) - stated(fit.free)
 
+    def trials(self, bench: Bench, accepted: Sequence[Accepted]) -> Tried:
+        """All trials beside accepted forms, and the promising ones scored, with the one of the best free run."""
+        forms = tuple(a.trial.form for a in accepted)
+        key = self.stiffer, self.without, *((a.number, id(f)) for a, f in zip(accepted, forms, strict=True))
+        if key not in self.tried:
+            every = [t for t in propose(bench, terms_of(accepted), self.log, self.stiffer) if name_of(t) not in self.without]
+            promising = sorted((t for t in every if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
+            freest = sorted(promising, key=lambda t: -t.run)[:1]
+            some = [t for t in promising if t in promising[:SCORED] or t in freest]
+            self.tried[key] = Tried(forms, every, holding.told_apart(bench, [scored(bench, self.blocks, t) for t in some]))
+        return self.tried[key]
+
     def good(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> tuple[Trial, ...]:
         """Trials that predict left-out blocks better than `scores` by MIN_GAIN, the best first. If a large form predicts as well as the
         best, to MIN_GAIN, and needs no more values, only large ones; otherwise the large form only imitates a smaller one."""
-        trials = propose(bench, terms_of(accepted), self.log, self.stiffer)
-        trials = sorted((t for t in trials if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
-        freest = sorted(trials, key=lambda t: -t.run)[:1]
-        trials = [t for t in trials if t in trials[:SCORED] or t in freest]
-        trials = holding.told_apart(bench, [scored(bench, self.blocks, t) for t in trials])
+        trials = self.trials(bench, accepted).scored
         better = [t.blocks - scores for t in trials]
         for t, b in zip(trials, better, strict=True):
             self.log(

@@ -23,9 +23,11 @@ Array = NDArray[np.float64]
 WORTH = 0.07  # of the force there: less is a small deviation. Any model is 2 to 5 % wrong, a name is worth it from 10 % on; the middle
 BENT = 0.6  # of a friction or a cube along a Gaussian motion is beside a straight line, in rms: sqrt(1 - 2/pi), sqrt(1 - 9/15)
 Z_95 = 1.96  # standard deviations that hold 95 %
+MIN_GAIN = 10.0  # log density by which a cause predicts left-out blocks better, at least
 RATIO = 3.0  # times the unmodelled force that remains beside all causes: where that is little, a name is worth it from less on
 KNOWN = 1.2  # times the noise that is known, about what it may be: it is another one at another time
 SYSTEMATIC = 0.007  # of the force there: what mis-modelling of 3.5 % does to a form's size, like it to 0.2 in rms, one direction of 25
+FINEST = 1e-3  # of a signal: no channel is calibrated better
 LINEAR = {"linear_spring": "s", "linear_damper": "v"}  # laws that a refit of their parameter makes as large as they have to be
 ABOUT_LINEAR = LINEAR | {"expression": "s"}  # and those that are about so
 
@@ -89,7 +91,7 @@ def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]
         motion = moved[form.index]
         force = np.sum([np.concatenate(_force(t, fit, motion)) for t in terms], axis=0)
         beside = _beside(bench, form.index, motion, force)
-        bent = 1.0 if all(_linear(t, fit, motion) for t in terms) else BENT
+        bent = 1.0 if all(is_linear(t, fit, motion) for t in terms) else BENT
         return _rms(beside) * own(bench.model, fit, targets, _lines(bench, form.index)) / (bent * motion.force) if motion.force else 0.0
     return max(_of_signal(bench, t, fit) for t in terms) * own(bench.model, fit, targets)
 
@@ -201,7 +203,7 @@ def _force(term: Term, fit: Fit, motion: Motion) -> list[Array]:
     return total
 
 
-def _linear(term: Term, fit: Fit, motion: Motion) -> bool:
+def is_linear(term: Term, fit: Fit, motion: Motion) -> bool:
     """Is its force twice as large, and of the other sign, along a motion that is: a spring and a damper in series, a hidden mass?"""
     twice = replace(motion, parts=tuple(replace(m, s=-2.0 * m.s, v=-2.0 * m.v) for m in motion.parts))
     once, other = (np.concatenate(_force(term, fit, m)) for m in (motion, twice))
