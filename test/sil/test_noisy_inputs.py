@@ -51,15 +51,17 @@ def recorded(path, measured: float, drove: float, seed: int, n: int = 8000):
     return path
 
 
-@pytest.mark.parametrize("measured, drove, taken", [(4e-4, 0.0, True), (0.0, 4e-4, False), (0.0, 0.0, False), (1e-5, 0.0, False)])
+@pytest.mark.parametrize(
+    "measured, drove, taken", [(4e-4, 0.0, True), (0.0, 4e-4, False), (0.0, 0.0, False), (1e-5, 0.0, True), (0.0, 1e-5, False)]
+)
 def test_noise_of_an_input_is_distinguished_from_a_signal_by_the_sensors(tmp_path, measured, drove, taken):
-    """The last is 0.2 % of what the foot does."""
+    """The last two are 0.2 % of what the foot does."""
     (tmp_path / "model.toml").write_text(RIG)
     model = penode_gen.load(tmp_path / "model.toml")
     found, notes = with_noise_of_inputs(model, load([recorded(tmp_path / "r.csv", measured, drove, 3)], model), "default")
     assert (found is not model) == bool(notes) == taken
     if taken:
-        assert found.inputs[0].noise == pytest.approx(4e-4, rel=0.05) and "foot 0.0004" in notes[0]
+        assert found.inputs[0].noise == pytest.approx(measured, rel=0.05) and f"foot {found.inputs[0].noise:.3g} m;" in notes[0]
 
 
 def test_nothing_is_wrong_with_a_model_whose_input_was_recorded_with_noise(tmp_path):

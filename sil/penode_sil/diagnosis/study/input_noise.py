@@ -16,7 +16,7 @@ from penode_gen import units
 from penode_gen.model import Model
 
 from ...recordings.measured import Measured
-from ..search.worth import SYSTEMATIC, Z_95
+from ..search.worth import FINEST, SYSTEMATIC, Z_95
 from .driven import experiment
 from .fit import Problem
 from .study import begin
@@ -26,20 +26,26 @@ Array = NDArray[np.float64]
 
 def with_noise_of_inputs(model: Model, train: Sequence[Measured], set_name: str) -> tuple[Model, list[str]]:
     """Returns the model with the white noise that recorded inputs show and the file does not state, and a note on it; the model as it is if
-    the sensors show that this noise drove the plant, or do not show. A shaker's noise is a signal, that of a road sensor is not, and unless
-    it is known, a lag of the input is named, which smooths it. Noise below SYSTEMATIC of an input is ignored: any model gets more wrong."""
+    the sensors show that this noise drove the plant. A shaker's noise is a signal, that of a road sensor is not, and unless it is known, a
+    lag of the input is named, which smooths it. Where the sensors do not show which it is, noise of more than SYSTEMATIC of an input is a
+    signal, and less is noise: unless it is known, what it does to two sensors alike is unexplained. Below FINEST of an input it is
+    ignored."""
     shown = {i.name: noise for k, i in enumerate(model.inputs) if not i.noise and (noise := _shown(train, i.name, k))}
     if not shown:
         return model, []
     share, deviation = _drove(model, train, set_name, shown)
+    doubt = Z_95 * deviation
+    small = all(shown[i.name] < SYSTEMATIC * _size(train, k) for k, i in enumerate(model.inputs) if i.name in shown)
     measured = 1.0 - share
-    if share + Z_95 * deviation > measured:
+    if share + (-doubt if small else doubt) > measured:
         return model, []
     noisy = replace(model, inputs=tuple(replace(i, noise=shown.get(i.name, i.noise)) for i in model.inputs))
     found = ", ".join(f"{i.name} {shown[i.name]:.3g} {units.si(i.unit)}" for i in model.inputs if i.name in shown)
+    sure = f"the sensors show {share:.0%} of it (+- {doubt:.0%}), so it did not drive the plant"
+    unsure = "too small for the sensors to show whether it drove the plant"
     return noisy, [
-        f"white noise in recorded inputs, of which the model file states none: {found}; the sensors show {share:.0%} of it "
-        f"(+- {Z_95 * deviation:.0%}), so it did not drive the plant. State it: noise = ..."
+        f"white noise in recorded inputs, of which the model file states none: {found}; {sure if share + doubt < measured else unsure}. "
+        "State it: noise = ..."
     ]
 
 
@@ -84,4 +90,9 @@ def _shown(train: Sequence[Measured], name: str, k: int) -> float:
     if any(c is None or c.how == "held" or c.noise is None or c.noise.pole for c in channels):
         return 0.0
     noise = float(np.sqrt(np.mean([c.noise.std**2 for c in channels if c and c.noise])))
-    return noise if noise > SYSTEMATIC * float(np.std(np.concatenate([m.u[:, k] for m in train]))) else 0.0
+    return noise if noise > FINEST * _size(train, k) else 0.0
+
+
+def _size(train: Sequence[Measured], k: int) -> float:
+    """Standard deviation of an input in all recordings [SI]."""
+    return float(np.std(np.concatenate([m.u[:, k] for m in train])))
