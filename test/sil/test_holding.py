@@ -137,3 +137,16 @@ def test_a_delay_is_no_hold(answer):
     assert abs(cause.parameters["delay"].value - 0.01175) < 0.03 / np.sqrt(
         STIFFNESS / MASS
     )  # what waves of 3 % do, where they go with the rate
+
+
+@pytest.mark.parametrize("held", (False, True))
+def test_a_controller_may_repeat_a_value(tmp_path, held):
+    """A command that stays for five samples is noted only where the model file does not say that a controller holds it."""
+    text = MODEL.replace('sample_time = "2 ms"', 'sample_time = "2 ms"\ninput = "held"') if held else MODEL
+    (tmp_path / "rig.toml").write_text(text)
+    rng = np.random.default_rng(5)
+    rows = np.column_stack([np.arange(2000) * STEP, rng.standard_normal((2000, 3)) * (1.0, 1e-3, 0.1)])
+    rows[700:705, 1] = rows[700, 1]
+    np.savetxt(tmp_path / "r.csv", rows, delimiter=",", header="time [s],push [N],x_mass [m],a_mass [m/s^2]", comments="", fmt="%.9g")
+    (found,) = load([tmp_path / "r.csv"], penode_gen.load(tmp_path / "rig.toml"))
+    assert ["push repeats a value" in n for n in found.quality.problems] == [True] * (not held)

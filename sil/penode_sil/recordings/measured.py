@@ -231,7 +231,7 @@ def _take(raster: Array, model: Model, signal: Input | Signal, table: Recording,
         notes.append(
             f"{table.header}: channel {signal.name}: 0 of its unit is {own.zero:.6g} K; it is read as a temperature, not a difference"
         )
-    _tell(notes, table, clock, signal, faults, own, driving)
+    _tell(notes, table, clock, signal, faults, own, driving, driving and model.interpolation == "held")
     smooth = None
     if driving and model.interpolation == "held" and (own.how or clock.one_by_one(step) or clock.interval > step):
         values, usable = held_on_raster(raster, clock, rows, bad)
@@ -317,9 +317,9 @@ def _noise(
 
 
 def _tell(
-    notes: list[str], table: Recording, clock: Clock, signal: Input | Signal, faults: quality.Faults, own: Own, driving: bool
+    notes: list[str], table: Recording, clock: Clock, signal: Input | Signal, faults: quality.Faults, own: Own, driving: bool, stepped: bool
 ) -> None:
-    """A line for each kind of trouble in a channel."""
+    """A line for each kind of trouble in a channel; a `stepped` one may repeat its values."""
     unit, per = signal.unit or "1", factor(signal.unit)
     edges = " and ".join(f"{(e * own.scale + own.zero) / per:.6g} {unit}" for e in (faults.low, faults.high) if e is not None)
     left = "they are bridged" if driving else "they are left out"
@@ -328,7 +328,7 @@ def _tell(
     for flags, what, done in (
         (faults.missing, "has no value", f"up to {BRIDGE} in a row are bridged" if driving else left),
         (faults.saturated, f"is cut off at {edges}", stays),
-        (faults.held, "repeats a value while the signal goes on", held),
+        (faults.held & (not stepped), "repeats a value while the signal goes on", held),
         (faults.spikes, "has a spike", left),
     ):
         if flags.any():
