@@ -9,31 +9,8 @@ import json
 
 import numpy as np
 import pytest
-from one_mass import STEP
+from footed import NOISE, STEP, model, moved, tones, write
 from samples import sample
-from scipy import signal
-
-FILE = """
-[model]
-name = "footed"
-sample_time = "2 ms"
-[parameters]
-m = { value = 20, unit = "kg" }
-k = { value = 20000, unit = "N/m" }
-d = { value = 120, unit = "N*s/m" }
-[inputs]
-foot = { unit = "m" }
-[bodies]
-mass = { mass = "m", position = "z", velocity = "v" }
-[elements]
-spring = { between = ["mass", "foot"], law = "linear_spring", stiffness = "k" }
-damper = { between = ["mass", "ground"], law = "linear_damper", damping = "d" }
-[outputs]
-z = { value = "z", unit = "m" }
-[sensors]
-z = { value = "z", unit = "m", noise = 2e-6 }
-a = { value = "der(v)", unit = "m/s^2", noise = 0.02 }
-"""
 
 FINE = 8  # parts of a sample that are integrated as straight lines: what they cut off tones is 1.6e-5 of them, 0.1 % in whole samples
 
@@ -42,12 +19,9 @@ def record(path, m: float, k: float, d: float, seed: int, n: int = 5000):
     """A recording of a rig with these parameters [SI] whose foot moves in 16 tones."""
     rng = np.random.default_rng(seed)
     t = np.arange(FINE * n) * STEP / FINE
-    foot = 1.5e-3 * sum(np.sin(2 * np.pi * rng.uniform(0.7, 9.0) * t + rng.uniform(0, 2 * np.pi)) for _ in range(16))
-    plant = signal.StateSpace([[0, 1], [-k / m, -d / m]], [[0], [k / m]], [[1, 0], [-k / m, -d / m]], [[0], [k / m]])
-    t, foot, y = t[::FINE], foot[::FINE], signal.lsim(plant, foot, t)[1][::FINE]
-    y += rng.standard_normal((n, 2)) * (2e-6, 0.02)
-    np.savetxt(path, np.column_stack([t, foot, y]), delimiter=",", header="time [s],foot [m],z [m],a [m/s^2]", comments="", fmt="%.9g")
-    return path
+    foot = tones(t, rng)
+    y = moved(t, foot, m, k, d)[::FINE] + rng.standard_normal((n, 2)) * NOISE
+    return write(path, t[::FINE], foot[::FINE], y)
 
 
 MASS, BOTH = ((22.6, 19920.0, 121.0), ["m"]), ((22.6, 19920.0, 160.0), ["d", "m"])
@@ -56,7 +30,7 @@ MASS, BOTH = ((22.6, 19920.0, 121.0), ["m"]), ((22.6, 19920.0, 160.0), ["d", "m"
 @pytest.mark.parametrize("true, off", sample((MASS, BOTH, ((20.1, 22800.0, 119.2), ["k"])), MASS))
 def test_only_values_that_are_off_by_more_than_they_are_rounded_are_named(tmp_path, penode, true, off):
     """Of three ratios any two values are as good as any others: all three pairs are in the set."""
-    (tmp_path / "rig.toml").write_text(FILE)
+    (tmp_path / "rig.toml").write_text(model())
     train, held = (record(tmp_path / f"{name}.csv", *true, seed) for name, seed in (("train", 1), ("held", 2)))
     penode("diagnose", tmp_path / "rig.toml", "--data", train, "--holdout", held, "-o", tmp_path / "out")
     found = json.loads((tmp_path / "out" / "diagnosis.json").read_text())

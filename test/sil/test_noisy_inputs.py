@@ -7,48 +7,23 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import signal
+from footed import NOISE, STEP, model, moved, tones, write
 
 import penode_gen
 from penode_sil.diagnosis import engine
 from penode_sil.diagnosis.study.input_noise import with_noise_of_inputs
 from penode_sil.recordings.measured import load
 
-RIG = """
-[model]
-name = "rig"
-sample_time = "2 ms"
-[parameters]
-m = { value = 20, unit = "kg", tolerance = 0.03 }
-k = { value = 20000, unit = "N/m", tolerance = 0.03 }
-d = { value = 120, unit = "N*s/m", tolerance = 0.03 }
-[inputs]
-foot = { unit = "m" }
-[bodies]
-mass = { mass = "m", position = "z", velocity = "v" }
-[elements]
-spring = { between = ["mass", "foot"], law = "linear_spring", stiffness = "k" }
-damper = { between = ["mass", "ground"], law = "linear_damper", damping = "d" }
-[outputs]
-z = { value = "z", unit = "m" }
-[sensors]
-z = { value = "z", unit = "m", noise = 2e-6 }
-a = { value = "der(v)", unit = "m/s^2", noise = 0.02 }
-"""
-M, K, D, STEP = 20.0, 2e4, 120.0, 2e-3
+RIG = model(", tolerance = 0.03")
 
 
 def recorded(path, measured: float, drove: float, seed: int, n: int = 8000):
     """A recording in which the foot has noise of `measured` [m] in its record and of `drove` [m] in truth."""
     rng = np.random.default_rng(seed)
     t = np.arange(n) * STEP
-    foot = 1.5e-3 * sum(np.sin(2 * np.pi * rng.uniform(0.7, 9.0) * t + rng.uniform(0, 2 * np.pi)) for _ in range(16))
-    foot = foot + drove * rng.standard_normal(n)
-    plant = signal.StateSpace([[0, 1], [-K / M, -D / M]], [[0], [K / M]], [[1, 0], [-K / M, -D / M]], [[0], [K / M]])
-    y = signal.lsim(plant, foot, t)[1] + rng.standard_normal((n, 2)) * (2e-6, 0.02)
-    rows = np.column_stack([t, foot + measured * rng.standard_normal(n), y])
-    np.savetxt(path, rows, delimiter=",", header="time [s],foot [m],z [m],a [m/s^2]", comments="", fmt="%.9g")
-    return path
+    foot = tones(t, rng) + drove * rng.standard_normal(n)
+    y = moved(t, foot) + rng.standard_normal((n, 2)) * NOISE
+    return write(path, t, foot + measured * rng.standard_normal(n), y)
 
 
 @pytest.mark.parametrize(
@@ -57,17 +32,17 @@ def recorded(path, measured: float, drove: float, seed: int, n: int = 8000):
 def test_noise_of_an_input_is_distinguished_from_a_signal_by_the_sensors(tmp_path, measured, drove, taken):
     """The last two are 0.2 % of what the foot does."""
     (tmp_path / "model.toml").write_text(RIG)
-    model = penode_gen.load(tmp_path / "model.toml")
-    found, notes = with_noise_of_inputs(model, load([recorded(tmp_path / "r.csv", measured, drove, 3)], model), "default")
-    assert (found is not model) == bool(notes) == taken
+    rig = penode_gen.load(tmp_path / "model.toml")
+    found, notes = with_noise_of_inputs(rig, load([recorded(tmp_path / "r.csv", measured, drove, 3)], rig), "default")
+    assert (found is not rig) == bool(notes) == taken
     if taken:
         assert found.inputs[0].noise == pytest.approx(measured, rel=0.05) and f"foot {found.inputs[0].noise:.3g} m;" in notes[0]
 
 
 def test_nothing_is_wrong_with_a_model_whose_input_was_recorded_with_noise(tmp_path):
     (tmp_path / "model.toml").write_text(RIG)
-    model = penode_gen.load(tmp_path / "model.toml")
-    train, held = (load([recorded(tmp_path / f"r{seed}.csv", 1e-4, 0.0, seed, 3000)], model) for seed in (3, 4))
-    found = engine.diagnose(model, train, held)
+    rig = penode_gen.load(tmp_path / "model.toml")
+    train, held = (load([recorded(tmp_path / f"r{seed}.csv", 1e-4, 0.0, seed, 3000)], rig) for seed in (3, 4))
+    found = engine.diagnose(rig, train, held)
     assert found.verdict == "no_discrepancy" and not found.causes
     assert any("noise in recorded inputs" in n for n in found.notes)
