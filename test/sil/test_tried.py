@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from penode_sil.diagnosis.search import rounds
@@ -39,17 +40,19 @@ def test_trials_beside_the_same_forms_are_kept(asked):
     search = Rounds(SimpleNamespace(), SimpleNamespace(), lambda text: None)
     first, other = form("friction"), form("friction")
     bench = SimpleNamespace(records=[])
-    found = search.trials(bench, [accepted(0, first)])
-    assert search.trials(bench, [accepted(0, first)]) is found and len(asked) == 1
+    scores = np.array([100.0, 200.0])
+    found = search.trials(bench, scores, [accepted(0, first)])
+    assert search.trials(bench, scores + 1.0, [accepted(0, first)]) is found and len(asked) == 1
     for again in (search, replace(search, stiffer=3.0), replace(search, without=frozenset({("cubic", "spring")}))):
-        again.trials(bench, [accepted(0, first)])
+        again.trials(bench, scores, [accepted(0, first)])
     assert asked == [1.0, 3.0, 1.0]
-    search.trials(bench, [accepted(1, first)])  # its parameters have other names
-    search.trials(bench, [accepted(0, other)])
-    assert len(asked) == 5
+    search.trials(bench, scores, [accepted(1, first)])  # its parameters have other names
+    search.trials(bench, scores, [accepted(0, other)])
+    search.trials(bench, scores + 2.0, [accepted(0, first)])  # a bench that got elsewhere
+    assert len(asked) == 6
 
 
 def test_forms_that_are_left_out_are_not_found(asked):
     search = Rounds(SimpleNamespace(), SimpleNamespace(), lambda text: None, without=frozenset({("bushing", "spring")}))
-    found = search.trials(SimpleNamespace(records=[]), [])
-    assert [[t.form.kind for t in some] for some in (found.trials, found.scored)] == [["cubic"]] * 2
+    found = search.trials(SimpleNamespace(records=[]), np.zeros(4), [])
+    assert [[t.form.kind for t in some] for some in (found.first, found.scored)] == [["cubic"]] * 2

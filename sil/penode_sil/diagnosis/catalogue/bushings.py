@@ -15,7 +15,7 @@ PARAMETERS = {  # what each number of a report means
     "maxwell_bushing": {"stiffness": "of the spring in series", "relaxation_time": "damping over stiffness of the series"}
 }
 RIVALS = {("bouc_wen", "maxwell_bushing"): "several amplitudes at one frequency: hysteresis changes with amplitude, relaxation does not"}
-STRAIGHT = KINDS
+STRAIGHT = LIKE_MASSES = KINDS  # a spring and a damper in series: for motion that is slower, a damper and a mass
 TIMES = (0.15, 0.6, 2.5)  # of s_rms/v_rms, which is the time of a radian
 
 

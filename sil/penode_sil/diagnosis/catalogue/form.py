@@ -168,7 +168,8 @@ class Sizes:
 class Kind(Protocol):
     """A file of the catalogue, for kinds of one curve. `forms` that may be at a place, given the motion of it; `MEANING` of each in a
     sentence; `sizes`: what a report gives of a form, name to unit and value (SI); `ONE`: only one of them is at a place, another one is but
-    a form of it; `STRAIGHT`: kinds with a straight part, which a place shares with its linear elements."""
+    a form of it; `STRAIGHT`: kinds with a straight part, which a place shares with its linear elements; `LIKE_MASSES`: kinds that may do
+    what another mass does."""
 
     KINDS: tuple[str, ...]
     MEANING: dict[str, str]

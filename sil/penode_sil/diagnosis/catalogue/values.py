@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from ..result import Cause, Named, Value
 
 KIND = "wrong_parameter"
-ROUNDED = 0.01  # tolerance of a value for which the file states none: it is written to two or three digits
+ROUNDED = 0.01  # the least tolerance of a value for which the file states none
 
 
 def named(parameter: str) -> Named:

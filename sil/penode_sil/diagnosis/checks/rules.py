@@ -156,7 +156,7 @@ def explained(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
     clear = all(RATIO * r.rms("extended") < min(map(r.rms, NOMINAL)) for r in _missed(table) if r.figure.signal in sensors)
     if end.withheld and (whole or clear):
         names = [place(c.kind, c.where) for c in end.withheld]
-        notes = tuple(n for n in d.notes if not (n.endswith(NOT_NAMED) and n.startswith(tuple(names))))
+        notes = tuple(n for n in d.notes if not (n.endswith(NOT_NAMED) and n.startswith(tuple(f"{name} " for name in names))))
         causes = tuple(trusted(c, d.explained) for c in end.withheld)
         sets = ({"causes": [{"kind": c.kind, "where": c.where} for c in causes], "posterior": min(c.confidence for c in causes)},)
         return replace(end, answer=replace(d, causes=causes, explanations=sets, notes=notes))
@@ -190,7 +190,7 @@ def spread(case: Case, end: End, table: Table) -> list[values.Few]:
 
 
 def by_values(case: Case, end: End, table: Table, found: Sequence[values.Few]) -> End:
-    """The end that names these values, with no others in the written model."""
+    """The end that names these values, beside which the written model has others within their tolerances only."""
     best, causes = found[0], values.caused(case, end, found)
     extended = write_extended(values.text(case, causes, best), case)
     fit = replace(end.study.null, simulated=best.fit.simulated)
@@ -288,7 +288,7 @@ def withdrawn(case: Case, end: End, table: Table, sensors: Sequence[str]) -> End
     note = f"{' and '.join(names)} would explain the training, but {off}: train with more excitations"
     extended = _as_it_was(case)
     d, causes = end.answer, tuple(end.faults) or (UNKNOWN,)
-    notes = [n for n in d.notes if not n.startswith(tuple(names))]
+    notes = [n for n in d.notes if not n.startswith(tuple(f"{name} " for name in names))]
     d = replace(d, verdict="unexplained", causes=causes, explanations=(), explained=0.0, notes=(*notes, note))
     return replace(end, answer=d, extended=extended, fit=None, withheld=(), without=None)
 

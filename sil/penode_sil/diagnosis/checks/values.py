@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: MIT
 # Copyright (c) 2026 the penode authors
-"""The explanation that moves the fewest values: is the model right with other values of some parameters, and the rest as the file has them?
+"""The explanation that moves the fewest values: is the model right with other values of some parameters, the rest as the file has them?
 
 Motion shows forces over masses, so a common factor of all of them is invisible, and a fit in which all are free may end at any factor. Of
-all values that follow the recordings equally well, those that differ from the file in the fewest parameters are the explanation."""
+all values that follow the recordings equally well, those that differ from the file in the fewest parameters, by more than they may be
+ROUNDED, are the explanation."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import combinations
 
@@ -20,12 +21,13 @@ from penode_gen.model import Model, Parameter
 
 from ...compared import worsened
 from ..catalogue import values as of_values
+from ..evidence.prior import SHARE
 from ..extend.entries import table
 from ..reliability import trust
 from ..result import Cause, Value
 from ..search.worth import Z_95
 from ..study.fit import Fit, Free, Problem
-from ..study.study import uncertain
+from ..study.study import LIMIT, uncertain
 from .case import Case, End
 from .figures import Table
 from .leftover import CHANCE, only_noise, rows
@@ -38,45 +40,43 @@ class Few:
 
     names: tuple[str, ...]
     fit: Fit
-    nominal: float  # chi2 of the nominal model, fitted within its tolerances
+    nominal: float = np.inf  # chi2 of the nominal model, fitted within the tolerances that its file states
 
     def __repr__(self) -> str:
         return " and ".join(self.names)
 
 
 def few(case: Case, end: End, figures: Table) -> list[Few]:
-    """The fewest parameters without a stated tolerance whose values, with the others as exact as they are written, make the nominal model
-    follow the training as well as with all of them free, and as the extended model does; the best first: more than one set, and the
-    recordings do not show which. None if it takes all of them, or if even all of them do not."""
+    """The fewest parameters without a stated tolerance whose values make the nominal model follow the training as well as with all of them
+    free, and as the extended model does; the best first: more than one set, and the recordings do not show which. All others are within
+    ROUNDED, or, where that alone is enough, as the file has them. None if it takes all of them, or if even all of them do not."""
     study, model = end.study, case.model
     unstated = [p for p in model.parameters.values() if _unstated(p)]
     if not unstated:
         return []
     known = {p.name: _within(p) for p in model.parameters.values() if p.tolerance > 0.0 and p.value}
-    known |= {p.name: _within(replace(p, tolerance=of_values.ROUNDED)) for p in unstated}
+    rounded = {p.name: _within(replace(p, tolerance=of_values.ROUNDED)) for p in unstated}
     starts = [f for f in study.null.free if f.target[0] == "start"]
     problem = Problem(model, study.experiments, study.metrics, study.set_name, study.linear.fastest)
     extended = [figures.predicted[e.name][1].at(e.time) for e in study.experiments]
 
-    def fit(names: Sequence[str]) -> Fit:
-        others = [f for name, f in known.items() if name not in names]
-        return problem.solve([*others, *(_free(model.parameters[n]) for n in names), *starts])
+    def fitted(names: Sequence[str], beside: Mapping[str, Free]) -> Few:
+        others = [f for name, f in {**known, **beside}.items() if name not in names]
+        return Few(tuple(names), problem.solve([*others, *(_free(model.parameters[n]) for n in names), *starts]))
 
-    nominal = fit(()).chi2
+    def good(x: Few) -> bool:
+        sound = all(map(np.isfinite, (x.fit.cost, *_sizes(x)))) and not _behind(end, x.fit, extended)
+        return sound and x.fit.cost - whole.fit.cost < _by_chance(len(unstated) - len(x.names))
 
-    def fitted(names: Sequence[str]) -> Few:
-        return Few(tuple(names), fit(names), nominal)
-
-    whole = fitted([p.name for p in unstated])
+    whole = fitted([p.name for p in unstated], {})
     if _behind(end, whole.fit, extended) or (end.answer.verdict == "unexplained" and not only_noise(study, whole.fit)):
         return []
+    beside = {} if good(fitted((), rounded)) else rounded
+    nominal = fitted((), {}).fit.chi2
     for count in range(1, max(len(unstated), 2)):
-        found = [fitted(names) for names in _promising(whole, count)]
-        good = [x for x in found if all(map(np.isfinite, (x.fit.cost, *_sizes(x)))) and not _behind(end, x.fit, extended)]
-        good = [x for x in good if x.fit.cost - whole.fit.cost < _by_chance(len(unstated) - count)]
-        if good:
-            good.sort(key=lambda x: x.fit.cost)
-            return [x for x in good if x.fit.cost - good[0].fit.cost < CHANCE * CHANCE]
+        found = [replace(fitted(names, beside), nominal=nominal) for names in _promising(whole, count, bool(beside))]
+        if found := sorted(filter(good, found), key=lambda x: x.fit.cost):
+            return [x for x in found if x.fit.cost - found[0].fit.cost < CHANCE * CHANCE]
     return []
 
 
@@ -85,9 +85,10 @@ def _by_chance(values: int) -> float:
     return float(chdtri(max(values, 1), erfc(CHANCE / np.sqrt(2.0))))
 
 
-def _promising(whole: Few, count: int) -> list[tuple[str, ...]]:
+def _promising(whole: Few, count: int, rounded: bool) -> list[tuple[str, ...]]:
     """Sets of `count` of the parameters of a fit, as many as there are parameters at most: those that lose least of it, by a quadratic
-    expansion, when all others are as the file has them. In logarithms of the parameters a common factor is a straight line."""
+    expansion, when all others are as the file has them, or as far from it as they are `rounded`. In logarithms of the parameters a common
+    factor is a straight line."""
     free = list(whole.fit.free)
     own = [k for k, f in enumerate(free) if f.target in whole.names]
     rest = [k for k in range(len(free)) if k not in own]
@@ -98,6 +99,8 @@ def _promising(whole: Few, count: int) -> list[tuple[str, ...]]:
     for chosen in combinations(range(len(own)), count):
         others = [k for k in range(len(own)) if k not in chosen]
         left = curvature[np.ix_(others, others)] - _absorbed(curvature, others, list(chosen))
+        if rounded:  # what others lose and what their priors cost, at the values between where that is least
+            left = left - left @ np.linalg.solve(left + np.eye(len(others)) / (of_values.ROUNDED * SHARE) ** 2, left)
         lost[tuple(str(free[own[k]].target) for k in chosen)] = float(off[others] @ left @ off[others])
     return sorted(lost, key=lambda names: lost[names])[: len(own)]
 
@@ -115,8 +118,9 @@ def taken(end: End, x: Few) -> float:
 
 
 def moved(case: Case, model: Model) -> set[str]:
-    """Parameters without a stated tolerance that have another value in a model."""
-    return {p.name for p in case.model.parameters.values() if _unstated(p) and model.parameters[p.name].value != p.value}
+    """Parameters without a stated tolerance that have another value in a model, by more than they may be ROUNDED."""
+    most = LIMIT * of_values.ROUNDED
+    return {p.name for p in filter(_unstated, case.model.parameters.values()) if abs(model.parameters[p.name].value / p.value - 1.0) > most}
 
 
 def _unstated(p: Parameter) -> bool:

@@ -25,7 +25,7 @@ from penode_gen.sets import fold
 from .compiling import functions
 
 Array = NDArray[np.float64]
-KEPT = 16  # results for a recording that are kept: transfers, of which there are two or three for each, spectra, inputs
+KEPT = 32  # results that are kept, one to three for each recording: transfers, spectra, inputs
 
 
 @dataclass(frozen=True)

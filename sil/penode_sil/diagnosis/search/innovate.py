@@ -59,8 +59,8 @@ class Found:
 def search(bench: Bench, log: Callable[[str], None]) -> Found:
     """Accepts causes round by round, revises early choices once later ones are known, and puts the large forms in a bench of their own.
     Where none is large, it looks again with an observer that corrects less: one that follows all that moves hides what happens seldom.
-    It resumes without forms that are only other masses. Where a large one only makes up for others, it may hide one of them: the search
-    resumes without it, and that end counts if more has a name in it and it predicts as well."""
+    It resumes without forms that only stand for another mass. Where a large one only makes up for others, it may hide one of them: the
+    search resumes without it, and that end counts if more has a name in it and it predicts as well."""
     rounds = Rounds(bench, Blocks.moving(bench), log)
     end = reconsidered(rounds, rounds.grow())
     if not any(end.large) and bench.level.size > 0.0:
@@ -70,20 +70,23 @@ def search(bench: Bench, log: Callable[[str], None]) -> Found:
     ended = _freely(rounds, centred(rounds, end))
     while ended.masses:
         rounds = replace(rounds, without=rounds.without | {name_of(a.trial) for a in ended.masses})
-        log(f"only other masses: {sorted(rounds.without)}")
-        ended = _freely(rounds, rounds.grow([a for a in ended.end.accepted if a not in ended.masses]))
+        log(f"stand for another mass: {sorted(rounds.without)}")
+        others = [a for a in ended.end.accepted if a not in ended.masses]
+        known = [replace(a, trials=tuple(t for t in a.trials if name_of(t) not in rounds.without)) for a in others]
+        ended = _freely(rounds, rounds.grow(known))
     if kept := ended.without_what_makes_up():
         other = _freely(rounds, rounds.grow(kept))
         log(f"without what makes up for others: {[name_of(a.trial) for a in other.of_names]}")
         as_good = float(np.sum(other.end.scores)) > float(np.sum(ended.end.scores)) - MIN_GAIN
-        ended = other if as_good and len(other.of_names) > len(ended.of_names) else ended
+        ended = other if as_good and len(other.of_names) > len(ended.of_names) and not other.masses else ended
+    rounds.tried.clear()  # slopes of every trial
     return _found(rounds, ended.end, ended.names, ended.run, ended.level)
 
 
 @dataclass(frozen=True, eq=False)
 class Ended:
     """The end of a search, which of its forms have `names`, the free `run` that fits best, the unmodelled `level` that remains, and forms
-    that are only other `masses`."""
+    that only stand for other `masses`."""
 
     end: Grown
     names: list[bool]

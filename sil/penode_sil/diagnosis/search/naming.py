@@ -159,8 +159,9 @@ def _small(t: Term, what: str) -> str:
 def _withheld(a: Accepted, found: Found) -> str:
     """A note on an accepted form without a name."""
     corrected = [x for x in found.named if at_one_place(a, x)]
-    if corrected and a.trial.share >= least(found.level, a.trial.whole):
-        whose = f"{place(*name_of(corrected[0].trial))}, which is not quite the one of its name"
+    large = [x.number for x, big in zip(found.end.accepted, found.end.large, strict=True) if big]
+    if corrected and a.number in large and a.trial.form.how == "force":
+        whose = f"{place(*name_of(corrected[0].trial))}, which is not quite the textbook form"
         return f"{place(*name_of(a.trial))} corrects the curve of {whose}; {NOT_NAMED}"
     if a.trial.taken < MIN_TAKEN:
         return _small(a.terms[0], f"{a.trial.taken:.0%} of the power of prediction errors")

@@ -113,8 +113,8 @@ def notes_on_guessed(model: Model, fit: Fit) -> list[str]:
 
 def _limit(p: Parameter, level: float = WORTH) -> float:
     """Largest relative deviation that is no cause: the tolerance, or, if the file states none, UNSTATED in a world that is `wrong` by
-    the `level` beside all that was found, and less in one that is nearly right: there is nothing else for a value to make up for. No value
-    is more exact than it is written."""
+    the `level` beside all that was found, and less in one that is nearly right: there is nothing else for a value to make up for; values
+    are ROUNDED at least."""
     return p.tolerance if p.tolerance > 0.0 else max(UNSTATED * wrong(level), of_values.ROUNDED)
 
 

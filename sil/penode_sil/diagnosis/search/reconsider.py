@@ -19,7 +19,7 @@ from ..evidence.screening import Probe
 from .propose import as_it_is, is_part, motions
 from .rounds import MIN_FORM, Accepted, Grown, Rounds, beyond_twice, moved, name_of, of_curve, score, scored, simplest, terms_of
 from .terms import Trial
-from .worth import MIN_GAIN, Z_95, is_linear, least, mostly, shift, wrong
+from .worth import MIN_GAIN, RATIO, Z_95, least, mostly, shift, wrong
 
 
 def reconsidered(rounds: Rounds, grown: Grown) -> Grown:
@@ -124,14 +124,14 @@ def needed(rounds: Rounds, grown: Grown) -> list[bool]:
 
 
 def masses_behind(bench: Bench, a: Accepted, moved: Sequence[Motion], level: float) -> list[str]:
-    """Masses of bodies at a form's place that are beyond their tolerances beside it and no cause there (see `shift`), where its force is in
-    proportion to the motion: a spring and a damper in series do what another mass does, and this mass takes back what they do too much.
-    The unmodelled `level` remains."""
-    if a.trial.form.how != "force" or not all(is_linear(t, bench.fit, moved[t.form.index]) for t in a.terms):
+    """Masses of bodies at the place of a form that may stand for another mass, fitted at more than RATIO tolerances from the file beside it
+    and no cause there (see `shift`): the form does what another mass does, and the fitted mass makes up for the difference. The unmodelled
+    `level` remains."""
+    if a.trial.form.kind not in getattr(catalogue.OF.get(a.trial.form.kind), "LIKE_MASSES", ()):
         return []
     ends, free = bench.places[a.trial.form.index].ends, {f.target: f for f in bench.fit.free if isinstance(f, Stated)}
     masses = [free[b.mass] for b in bench.model.bodies if b.name in ends and b.mass in free]
-    off = [str(f.target) for f in masses if abs(f.value - f.origin) > f.sigma / SHARE]
+    off = [str(f.target) for f in masses if abs(f.value - f.origin) > RATIO * f.sigma / SHARE]
     return [m for m in off if shift(bench.model, bench, moved, m) < least(level, 0.0)]
 
 

@@ -62,18 +62,19 @@ class Grown:
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """The `trials` beside accepted forms, which it keeps, for their identity is the key; the promising ones of them, `scored`."""
+    """The `first` trials beside accepted `forms` (kept, for their identity is the key), and the promising ones `scored`, in a bench of
+    the score `total`."""
 
     forms: tuple[Form, ...]
-    trials: list[Trial]
+    first: list[Trial]
     scored: list[Trial]
+    total: float
 
 
 @dataclass(frozen=True, eq=False)
 class Rounds:
     """Rounds of a search that starts from a bench without any cause. Causes are proposed by an observer for `stiffer` times less unmodelled
-    force than there is. What was `tried` beside the same forms before is taken from there. Names of forms that are not to be found again
-    are `without`."""
+    force than there is. What was `tried` beside the same forms is not tried again; forms of the names `without` are not found."""
 
     start: Bench
     blocks: Blocks
@@ -118,7 +119,7 @@ class Rounds:
         """Two causes that together predict left-out blocks better than `scores`, where no cause does alone: the delay and the friction of a
         drive that starts from rest. Empty without any."""
         best, total = [], float(np.sum(scores)) + 2.0 * MIN_GAIN
-        for t in (scored(bench, self.blocks, x) for x in self.trials(bench, ()).trials[:SCORED]):
+        for t in (scored(bench, self.blocks, x) for x in self.trials(bench, scores, ()).first):
             beside, terms = adopt(bench, t, 0)
             beside, level = _based(beside, self.blocks)
             first = Accepted(t, 0, tuple(terms), (t,))
@@ -150,22 +151,25 @@ class Rounds:
         fit = problem.solve([f for f in bench.fit.free if f.target not in own], bench.fit.by, FOLLOWED) if own else bench.fit
         return float(np.sum(self.blocks.scores(problem, fit))) - stated(fit.free)
 
-    def trials(self, bench: Bench, accepted: Sequence[Accepted]) -> Tried:
-        """All trials beside accepted forms, and the promising ones scored, with the one of the best free run."""
+    def trials(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> Tried:
+        """Trials beside accepted forms in a bench with these scores, and the promising ones scored, with the one of the best free run. They
+        are those of before if that bench had the same score, to PROMISE."""
         forms = tuple(a.trial.form for a in accepted)
         key = self.stiffer, self.without, *((a.number, id(f)) for a, f in zip(accepted, forms, strict=True))
-        if key not in self.tried:
+        total = float(np.sum(scores))
+        if key not in self.tried or abs(self.tried[key].total - total) > PROMISE:
             every = [t for t in propose(bench, terms_of(accepted), self.log, self.stiffer) if name_of(t) not in self.without]
             promising = sorted((t for t in every if t.gain > PROMISE), key=lambda t: (not _matters(t), -t.gain))
             freest = sorted(promising, key=lambda t: -t.run)[:1]
             some = [t for t in promising if t in promising[:SCORED] or t in freest]
-            self.tried[key] = Tried(forms, every, holding.told_apart(bench, [scored(bench, self.blocks, t) for t in some]))
+            found = holding.told_apart(bench, [scored(bench, self.blocks, t) for t in some])
+            self.tried[key] = Tried(forms, every[:SCORED], found, total)
         return self.tried[key]
 
     def good(self, bench: Bench, scores: Array, accepted: Sequence[Accepted]) -> tuple[Trial, ...]:
         """Trials that predict left-out blocks better than `scores` by MIN_GAIN, the best first. If a large form predicts as well as the
         best, to MIN_GAIN, and needs no more values, only large ones; otherwise the large form only imitates a smaller one."""
-        trials = self.trials(bench, accepted).scored
+        trials = self.trials(bench, scores, accepted).scored
         better = [t.blocks - scores for t in trials]
         for t, b in zip(trials, better, strict=True):
             self.log(

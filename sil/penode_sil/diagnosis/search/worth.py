@@ -91,7 +91,7 @@ def share(bench: Bench, terms: Sequence[Term], fit: Fit, moved: Sequence[Motion]
         motion = moved[form.index]
         force = np.sum([np.concatenate(_force(t, fit, motion)) for t in terms], axis=0)
         beside = _beside(bench, form.index, motion, force)
-        bent = 1.0 if all(is_linear(t, fit, motion) for t in terms) else BENT
+        bent = 1.0 if all(_linear(t, fit, motion) for t in terms) else BENT
         return _rms(beside) * own(bench.model, fit, targets, _lines(bench, form.index)) / (bent * motion.force) if motion.force else 0.0
     return max(_of_signal(bench, t, fit) for t in terms) * own(bench.model, fit, targets)
 
@@ -203,7 +203,7 @@ def _force(term: Term, fit: Fit, motion: Motion) -> list[Array]:
     return total
 
 
-def is_linear(term: Term, fit: Fit, motion: Motion) -> bool:
+def _linear(term: Term, fit: Fit, motion: Motion) -> bool:
     """Is its force twice as large, and of the other sign, along a motion that is: a spring and a damper in series, a hidden mass?"""
     twice = replace(motion, parts=tuple(replace(m, s=-2.0 * m.s, v=-2.0 * m.v) for m in motion.parts))
     once, other = (np.concatenate(_force(term, fit, m)) for m in (motion, twice))

@@ -27,7 +27,7 @@ from .noise import Experiment, Metric, Thinning, thinning
 Array = NDArray[np.float64]
 SPARSE = 16  # samples of which one is looked at for what is far beyond all bounds
 FAR = 1e20  # residual of a run that cannot be simulated, and the most that it shows
-MOVE = 1e-6  # of a unit: finite differences. Larger ones make a common scale of all forces, or a common offset, seem to bend the sensors
+MOVE = 1e-6  # of a unit: finite differences. Larger ones make a common scale of all forces, or a common offset, look nonlinear
 PROMISE = 0.7  # of the gain that a full step predicts: if that is reached, the derivatives have hardly changed
 DAMPING = np.array([0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0])  # of steps, relative to the curvature
 
@@ -63,6 +63,11 @@ class Free:
     def offset(self) -> float:
         """How far it is from its prior, in deviations of that."""
         return (self.value - self.origin) / self.sigma
+
+    @property
+    def slope(self) -> float:
+        """Of the value with a shift."""
+        return self.value if self.log else self.unit
 
     def of(self, what: str, recording: int) -> bool:
         """Is it a start state, or an own value, of a recording?"""
@@ -101,14 +106,14 @@ class Fit:
     def covariance(self) -> Array:
         """Covariance of all free values, in their units (log: relative). None is off by more than a factor of FAR: else the least slope
         along the time constant of a cooling that nothing shows would make a well-known loss uncertain."""
-        priors = np.array([max(f.unit / f.sigma, f.log / np.log(FAR)) ** 2 for f in self.free])
+        priors = np.array([max(abs(f.slope) / f.sigma, f.log / np.log(FAR)) ** 2 for f in self.free])
         curvature = self.jacobian.T @ self.jacobian + np.diag(priors)
         scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
         return np.linalg.pinv(curvature * np.outer(scale, scale), rcond=1e-10) * np.outer(scale, scale)
 
     def steps(self) -> tuple[Array, float]:
         """Steps [DAMPING, free] towards the least chi2 with priors, and how much of it the full one promises to take."""
-        precision = np.array([f.unit / f.sigma for f in self.free])
+        precision = np.array([f.slope / f.sigma for f in self.free])
         curvature = self.jacobian.T @ self.jacobian + np.diag(precision**2)
         slope = self.jacobian.T @ self.residual - precision * np.array([f.offset for f in self.free])
         stuck = [(f.value <= f.low and s <= 0.0) or (f.value >= f.high and s >= 0.0) for f, s in zip(self.free, slope, strict=True)]

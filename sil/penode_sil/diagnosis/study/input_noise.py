@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 def with_noise_of_inputs(model: Model, train: Sequence[Measured], set_name: str) -> tuple[Model, list[str]]:
     """Returns the model with the white noise that recorded inputs show and the file does not state, and a note on it; the model as it is if
     the sensors show that this noise drove the plant. A shaker's noise is a signal, that of a road sensor is not, and unless it is known, a
-    lag of the input is named, which smooths it. Where the sensors do not show which it is, noise of more than SYSTEMATIC of an input is a
-    signal, and less is noise: unless it is known, what it does to two sensors alike is unexplained. Below FINEST of an input it is
-    ignored."""
+    lag of the input is named, which smooths it. Where the sensors do not show which it is, noise of more than SYSTEMATIC of any input is a
+    signal, and less is noise: if it is not taken into account, the error that it makes in several sensors stays unexplained. Below FINEST
+    of an input it is ignored."""
     shown = {i.name: noise for k, i in enumerate(model.inputs) if not i.noise and (noise := _shown(train, i.name, k))}
     if not shown:
         return model, []
@@ -42,7 +42,7 @@ def with_noise_of_inputs(model: Model, train: Sequence[Measured], set_name: str)
     noisy = replace(model, inputs=tuple(replace(i, noise=shown.get(i.name, i.noise)) for i in model.inputs))
     found = ", ".join(f"{i.name} {shown[i.name]:.3g} {units.si(i.unit)}" for i in model.inputs if i.name in shown)
     sure = f"the sensors show {share:.0%} of it (+- {doubt:.0%}), so it did not drive the plant"
-    unsure = "too small for the sensors to show whether it drove the plant"
+    unsure = "the sensors do not show whether it drove the plant"
     return noisy, [
         f"white noise in recorded inputs, of which the model file states none: {found}; {sure if share + doubt < measured else unsure}. "
         "State it: noise = ..."
