@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from ..reliability import trust
 from ..result import Cause, Value
 from ..search.worth import Z_95
 from ..study.fit import Fit, Free, Problem
-from ..study.study import LIMIT, uncertain
+from ..study.study import uncertain
 from .case import Case, End
 from .figures import Table
 from .leftover import CHANCE, only_noise, rows
@@ -48,8 +48,8 @@ class Few:
 
 def few(case: Case, end: End, figures: Table) -> list[Few]:
     """The fewest parameters without a stated tolerance whose values make the nominal model follow the training as well as with all of them
-    free, and as the extended model does; the best first: more than one set, and the recordings do not show which. All others are within
-    ROUNDED, or, where that alone is enough, as the file has them. None if it takes all of them, or if even all of them do not."""
+    free, and as the extended model does; the best first: more than one set, and the recordings do not show which. All others are as the
+    file has them, or, where that is not enough, ROUNDED, unless that alone is. None if it takes all of them, or if even all do not."""
     study, model = end.study, case.model
     unstated = [p for p in model.parameters.values() if _unstated(p)]
     if not unstated:
@@ -71,9 +71,9 @@ def few(case: Case, end: End, figures: Table) -> list[Few]:
     whole = fitted([p.name for p in unstated], {})
     if _behind(end, whole.fit, extended) or (end.answer.verdict == "unexplained" and not only_noise(study, whole.fit)):
         return []
-    beside = {} if good(fitted((), rounded)) else rounded
+    ways: list[dict[str, Free]] = [{}] if good(fitted((), rounded)) else [{}, rounded]
     nominal = fitted((), {}).fit.chi2
-    for count in range(1, max(len(unstated), 2)):
+    for count, beside in product(range(1, max(len(unstated), 2)), ways):
         found = [replace(fitted(names, beside), nominal=nominal) for names in _promising(whole, count, bool(beside))]
         if found := sorted(filter(good, found), key=lambda x: x.fit.cost):
             return [x for x in found if x.fit.cost - found[0].fit.cost < CHANCE * CHANCE]
@@ -118,9 +118,8 @@ def taken(end: End, x: Few) -> float:
 
 
 def moved(case: Case, model: Model) -> set[str]:
-    """Parameters without a stated tolerance that have another value in a model, by more than they may be ROUNDED."""
-    most = LIMIT * of_values.ROUNDED
-    return {p.name for p in filter(_unstated, case.model.parameters.values()) if abs(model.parameters[p.name].value / p.value - 1.0) > most}
+    """Parameters without a stated tolerance that have another value in a model."""
+    return {p.name for p in case.model.parameters.values() if _unstated(p) and model.parameters[p.name].value != p.value}
 
 
 def _unstated(p: Parameter) -> bool:
