@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 from onnx_graphs import B1, MLP, MLP_CONSTANTS, SHIFT, W1, Constants, model, node, refused, save
 
@@ -139,6 +139,7 @@ GOOD = model(GOOD_NODES, MLP_CONSTANTS | {"s": SHIFT}).SerializeToString()
 
 
 @settings(max_examples=500, deadline=None)
+@example(cut=0, changes=[(75, 10)])  # a line feed in the name of an operator
 @given(cut=st.integers(0, len(GOOD)), changes=st.lists(st.tuples(st.integers(0, len(GOOD) - 1), st.integers(0, 255)), max_size=4))
 def test_broken_file_never_ends_in_another_exception(tmp_path_factory: Any, cut: int, changes: list[tuple[int, int]]) -> None:
     content = bytearray(GOOD)

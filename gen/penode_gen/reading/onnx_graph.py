@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 
 from ..networks import NetworkError, Vector
+from .places import one_line
 
 Shape = tuple[int, ...]
 P = ParamSpec("P")
@@ -48,7 +49,7 @@ class Graph:
     # ---- errors ----
 
     def error(self, what: str, remedy: str) -> NetworkError:
-        return NetworkError(f"{self.path}: {what}; {remedy}")
+        return NetworkError(one_line(f"{self.path}: {what}; {remedy}"))  # names in a file may have line feeds
 
     def node_error(self, index: int, node: NodeProto, what: str, remedy: str) -> NetworkError:
         name = f" '{node.name}'" if node.name else ""
