@@ -40,7 +40,7 @@ class Few:
 
     names: tuple[str, ...]
     fit: Fit
-    nominal: float = np.inf  # chi2 of the nominal model, fitted within the tolerances that its file states
+    nominal: float  # chi2 of the nominal model, fitted within the tolerances that its file states
 
     def __repr__(self) -> str:
         return " and ".join(self.names)
@@ -60,9 +60,11 @@ def few(case: Case, end: End, figures: Table) -> list[Few]:
     problem = Problem(model, study.experiments, study.metrics, study.set_name, study.linear.fastest)
     extended = [figures.predicted[e.name][1].at(e.time) for e in study.experiments]
 
+    nominal = problem.solve([*known.values(), *starts]).chi2
+
     def fitted(names: Sequence[str], beside: Mapping[str, Free]) -> Few:
         others = [f for name, f in {**known, **beside}.items() if name not in names]
-        return Few(tuple(names), problem.solve([*others, *(_free(model.parameters[n]) for n in names), *starts]))
+        return Few(tuple(names), problem.solve([*others, *(_free(model.parameters[n]) for n in names), *starts]), nominal)
 
     def good(x: Few) -> bool:
         sound = all(map(np.isfinite, (x.fit.cost, *_sizes(x)))) and not _behind(end, x.fit, extended)
@@ -72,10 +74,9 @@ def few(case: Case, end: End, figures: Table) -> list[Few]:
     if _behind(end, whole.fit, extended) or (end.answer.verdict == "unexplained" and not only_noise(study, whole.fit)):
         return []
     ways: list[dict[str, Free]] = [{}] if good(fitted((), rounded)) else [{}, rounded]
-    nominal = fitted((), {}).fit.chi2
     for count, beside in product(range(1, max(len(unstated), 2)), ways):
-        found = [replace(fitted(names, beside), nominal=nominal) for names in _promising(whole, count, bool(beside))]
-        if found := sorted(filter(good, found), key=lambda x: x.fit.cost):
+        tried = (fitted(names, beside) for names in _promising(whole, count, bool(beside)))
+        if found := sorted(filter(good, tried), key=lambda x: x.fit.cost):
             return [x for x in found if x.fit.cost - found[0].fit.cost < CHANCE * CHANCE]
     return []
 

@@ -15,7 +15,7 @@ from ..evidence.fit import Fit
 from ..evidence.observer import Filter, bias
 from ..evidence.screening import Probe
 from .propose import FREE_RUN, motions
-from .reconsider import at_one_place, centred, masses_behind, needed, reconsidered
+from .reconsider import at_one_place, centred, needed, reconsidered, stands_for_mass
 from .rounds import LEVEL_FACTORS, MIN_FORM, Accepted, Grown, Rounds, is_large, name_of, terms_of
 from .terms import Term, Trial
 from .worth import FINEST, MIN_GAIN, RATIO, Z_95, least, mostly, remaining
@@ -114,7 +114,7 @@ def _freely(rounds: Rounds, end: Grown) -> Ended:
     end = _run_free(end, level, rounds.log)
     moved = motions(Probe.of(bench)) if any(end.large) else []
     large = [a for a, big in zip(end.accepted, end.large, strict=True) if big]
-    masses = [a for a in large if masses_behind(bench, a, moved, max(level, bench.level.size))]
+    masses = [a for a in large if stands_for_mass(bench, a, moved, max(level, bench.level.size))]
     return Ended(end, needed(rounds, end), run, level, masses)
 
 

@@ -123,16 +123,16 @@ def needed(rounds: Rounds, grown: Grown) -> list[bool]:
     return [a in large for a in grown.accepted]
 
 
-def masses_behind(bench: Bench, a: Accepted, moved: Sequence[Motion], level: float) -> list[str]:
-    """Masses of bodies at the place of a form that may stand for another mass, fitted at more than RATIO tolerances from the file beside it
-    and no cause there (see `shift`): the form does what another mass does, and the fitted mass makes up for the difference. The unmodelled
-    `level` remains."""
+def stands_for_mass(bench: Bench, a: Accepted, along: Sequence[Motion], level: float) -> bool:
+    """Does a form do what another mass does? It may, and a mass of the bodies at its place is fitted at more than RATIO tolerances from the
+    file beside it, and no cause (see `shift`, `along` the motion of every place): it makes up for the difference. The unmodelled `level`
+    remains."""
     if a.trial.form.kind not in getattr(catalogue.OF.get(a.trial.form.kind), "LIKE_MASSES", ()):
-        return []
+        return False
     ends, free = bench.places[a.trial.form.index].ends, {f.target: f for f in bench.fit.free if isinstance(f, Stated)}
     masses = [free[b.mass] for b in bench.model.bodies if b.name in ends and b.mass in free]
     off = [str(f.target) for f in masses if abs(f.value - f.origin) > RATIO * f.sigma / SHARE]
-    return [m for m in off if shift(bench.model, bench, moved, m) < least(level, 0.0)]
+    return any(shift(bench.model, bench, along, m) < least(level, 0.0) for m in off)
 
 
 def at_one_place(a: Accepted, other: Accepted) -> bool:
